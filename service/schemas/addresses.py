@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from ipaddress import IPv4Address, IPv6Address, ip_address
 from typing import Annotated
 from urllib.parse import urlsplit
@@ -14,6 +15,8 @@ CallbackUrl = Annotated[str, StringConstraints(max_length=1024), AfterValidator(
 # Stands where a secret was in an address that is shown.
 HIDDEN = "***"
 SOURCE_SCHEMES = ("http", "https", "rtsp", "rtsps")
+# The SHA-256 of the certificate that a camera must have: most sign their own, which no authority vouches for.
+PINNED = re.compile(r"(https|rtsps)://[^#]*#tls_sha256=(?:[0-9a-f]{2}:?){32}", re.IGNORECASE)
 
 
 def _is_a_source(url: str) -> str:
@@ -23,8 +26,13 @@ def _is_a_source(url: str) -> str:
         complete = parts.scheme in SOURCE_SCHEMES and parts.hostname and (parts.port is None or parts.port > 0)
     except ValueError:
         complete = False
-    if not complete or not url.isascii() or not url.isprintable() or " " in url or "#" in url:
+    if not complete or not url.isascii() or not url.isprintable() or " " in url:
         raise ValueError(f"a source is an address that begins with one of {', '.join(SOURCE_SCHEMES)} and names a host")
+    if "#" in url and not PINNED.fullmatch(url):
+        raise ValueError(
+            "behind # a source has nothing but tls_sha256= and the 64 hexadecimal digits of a certificate's SHA-256, "
+            "and that only where it begins with https or rtsps; write %23 for a # in a password"
+        )
     return url
 
 

@@ -20,6 +20,11 @@ def is_permitted(host: str, addresses: Collection[str], allowed: Sequence[str]) 
     return _named(host, allowed) or _in_a_network(addresses, allowed)
 
 
+def permitted_addresses(host: str, addresses: Sequence[str], allowed: Sequence[str]) -> list[str]:
+    """Return the addresses of a host, in their order, that a connection may be made to."""
+    return [address for address in addresses if is_permitted(host, [address], allowed)]
+
+
 def _named(host: str, allowed: Sequence[str]) -> bool:
     return ip_of(host) is None and any(fnmatchcase(host.lower(), pattern.lower()) for pattern in allowed)
 

@@ -8,15 +8,15 @@ from dataclasses import dataclass
 
 from service.schemas.addresses import HIDDEN
 
-AUTHORITY = re.compile(r"([a-z]+://)(?:([^/?]*)@)?([^/?]*)(.*)", re.DOTALL)
+AUTHORITY = re.compile(r"([a-z]+://)(?:([^/?]*)@)?([^/?#]*)(.*)", re.DOTALL)
 # As makers of cameras call them.
 NAMES = (
     "usr|user|user_?name|login|loginuse|account|pwd|pass|passwd|password|passcode|passphrase|loginpas|pw|psw|"
     "token|access_?token|auth|authorization|auth_?basic|key|api_?key|secret|sig|signature|session|session_?id|sid"
 )
 # Of a path a parameter ends with its part, as in /user=admin&password=x/stream; in a query it may have slashes.
-PARAMETER = re.compile(rf"(?P<begin>[/&;])(?P<name>{NAMES})=(?P<value>[^&;/?]+)", re.IGNORECASE)
-OF_A_QUERY = re.compile(rf"(?P<begin>[?&;])(?P<name>{NAMES})=(?P<value>[^&;]+)", re.IGNORECASE)
+PARAMETER = re.compile(rf"(?P<begin>[/&;])(?P<name>{NAMES})=(?P<value>[^&;/?#]+)", re.IGNORECASE)
+OF_A_QUERY = re.compile(rf"(?P<begin>[?&;])(?P<name>{NAMES})=(?P<value>[^&;#]+)", re.IGNORECASE)
 
 
 class UnknownSecret(Exception):  # noqa: N818

@@ -82,7 +82,8 @@ class CameraIn(UnposedCamera):
         None,
         description="Where its frames can be fetched: the address of a JPEG or PNG, of motion JPEG, or an RTSP stream. "
         f"User and password, also in parameters such as `pwd=`, are not shown again: `{HIDDEN}` stands for them, and "
-        "sent back keeps them.",
+        "sent back keeps them. Certificates of https and rtsps are verified; behind `#tls_sha256=` stands the SHA-256 "
+        "of one that the camera signed itself.",
         examples=["http://user:password@10.1.0.7/snapshot.jpg"],
     )
 

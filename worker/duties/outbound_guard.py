@@ -15,8 +15,7 @@ from importlib.metadata import version
 
 import httpx
 
-PORTS = {"http": 80, "https": 443, "rtsp": 554, "rtsps": 322}
-
+from worker.sources.connection import port_of
 
 # Resolvers ask several servers, each several times, for as long as they are set to.
 LOOK_UP_S = 5.0
@@ -28,7 +27,7 @@ class HostNotFoundError(Exception):
 
 def look_up(target: httpx.URL) -> list[str]:
     """Return the IP addresses of the host of a URL. Raises `HostNotFoundError`."""
-    name, port = target.raw_host.decode("ascii"), target.port or PORTS[target.scheme]
+    name, port = target.raw_host.decode("ascii"), port_of(target)
     looked_up: list[list[str] | str] = []
 
     def resolve() -> None:

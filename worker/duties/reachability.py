@@ -16,9 +16,8 @@ import httpx
 
 from service.schemas import hosts
 from worker.duties import outbound_guard
+from worker.sources.connection import CONNECT_S, port_of
 
-CONNECT_S = 1.5
-"""A host that is there answers within this time, over a mobile network too."""
 SILENT_S = 30.0
 """For so long a host that was silent is taken to be so still."""
 LATE_TO_BE_SILENT = 2
@@ -79,9 +78,8 @@ class HostReachability:
         except outbound_guard.HostNotFoundError:
             return True
         # To what ESC_SOURCES does not name no connection is made.
-        if not hosts.is_permitted(target.host, addresses, self._allowed):
-            return True
-        return any(_accepts(address, host[1]) for address in addresses)
+        permitted = hosts.permitted_addresses(target.host, addresses, self._allowed)
+        return not permitted or any(_accepts(address, host[1]) for address in permitted)
 
 
 def _accepts(address: str, port: int) -> bool:
@@ -95,4 +93,4 @@ def _accepts(address: str, port: int) -> bool:
 
 
 def _host(source: httpx.URL) -> Host:
-    return source.host, source.port or outbound_guard.PORTS[source.scheme]
+    return source.host, port_of(source)

@@ -11,8 +11,9 @@ import os
 import sys
 import threading
 import time
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from urllib.parse import unquote
+from typing import TYPE_CHECKING
 
 import httpx
 import structlog
@@ -22,19 +23,20 @@ from service.schemas import hosts
 from service.schemas.programs.sources import SourceAnswer, SourceTask, frame_file, longest_s
 from service.schemas.source_urls import SourceSecrets, with_parameters
 from worker.duties import outbound_guard
-from worker.sources import mjpeg
-from worker.sources.rtsp_relay import Relay
+from worker.sources.errors import CameraError
+from worker.sources.http_camera import fetch_picture
+from worker.sources.rtsp_relay import FFMPEG_OPTIONS, Relay
 
-# The first frames of a stream may be put together from halves.
+if TYPE_CHECKING:
+    import cv2
+
+# From the first whole frame on. Encoders make that one coarser than what follows, which refines it.
 FRAMES_PASSED_BY = 5
+# FFmpeg shows frames of these after a key frame or a finished intra refresh (recovery point) alone. Of other codecs it
+# shows at once what changes on a grey ground, up to the first key frame.
+SHOWN_WHOLE = ("h264", "avc1", "hevc", "hev1", "hvc1")
 JPEG_QUALITY = 95
-# What FFmpeg may speak, to the relay; `file` and the like are not among them.
-PROTOCOLS = "rtsp,rtp,tcp"
 log = structlog.get_logger()
-
-
-class NoFrameError(Exception):
-    """The source gave none; the message says why, and what to do."""
 
 
 def main() -> None:
@@ -61,7 +63,7 @@ def _answer(camera: str, task: SourceTask) -> None:
             waited_s += early_s
             frame_file(task, camera, number).write_bytes(_fetch(target, secrets.userinfo, task))
         answer = SourceAnswer(camera=camera)
-    except NoFrameError as error:
+    except CameraError as error:
         answer = SourceAnswer(camera=camera, why=str(error))
     except Exception as error:  # one camera's trouble is not that of the others
         log.exception("cannot fetch", camera=camera)
@@ -75,74 +77,27 @@ def _fetch(target: httpx.URL, credentials: str | None, task: SourceTask) -> byte
     try:
         addresses = outbound_guard.look_up(target)
     except outbound_guard.HostNotFoundError as error:
-        raise NoFrameError(str(error)) from None
-    if not hosts.is_permitted(target.host, addresses, task.allowed):
-        raise NoFrameError(f"{target.host} is {', '.join(addresses)}, which ESC_SOURCES does not name")
+        raise CameraError(str(error)) from None
+    permitted = hosts.permitted_addresses(target.host, addresses, task.allowed)
+    if not permitted:
+        raise CameraError(f"{target.host} is {', '.join(addresses)}, which ESC_SOURCES does not name")
     if target.scheme in ("rtsp", "rtsps"):
-        port = target.port or outbound_guard.PORTS[target.scheme]
-        with Relay(target, addresses, port, credentials) as relay:
+        with Relay(target, permitted, credentials) as relay:
             return _frame_of_stream(relay, task)
+    return asyncio.run(_picture(target, permitted, credentials, task))
+
+
+async def _picture(target: httpx.URL, addresses: Sequence[str], credentials: str | None, task: SourceTask) -> bytes:
     try:
-        return asyncio.run(_picture(target, addresses[0], credentials, task))
+        async with asyncio.timeout(task.seconds):
+            return await fetch_picture(target, addresses, credentials, task.most_bytes)
     except TimeoutError:
-        raise NoFrameError(f"no answer within {task.seconds:g} s") from None
-    except mjpeg.NotMultipartError:
-        raise NoFrameError("it calls itself a row of pictures (multipart) and has no parts") from None
-    except httpx.HTTPError as error:
-        raise NoFrameError(f"{type(error).__name__}: {error}") from None
-
-
-async def _picture(target: httpx.URL, address: str, credentials: str | None, task: SourceTask) -> bytes:
-    # The authorities take longer to load than a picture takes to come.
-    tls = httpx.create_ssl_context() if target.scheme == "https" else False
-    async with (
-        asyncio.timeout(task.seconds),
-        httpx.AsyncClient(verify=tls, trust_env=False, timeout=task.seconds) as client,
-    ):
-        auth = None
-        if credentials is not None:
-            # Cameras ask for one way or the other; a password goes out plainly only to one that asks for that.
-            async with outbound_guard.stream(client, "GET", target, address) as response:
-                if response.status_code != httpx.codes.UNAUTHORIZED:
-                    return await _body(response, task)
-                auth = _auth(response.headers.get("www-authenticate", ""), credentials)
-        async with outbound_guard.stream(client, "GET", target, address, auth=auth) as response:
-            return await _body(response, task)
-
-
-def _auth(challenge: str, credentials: str) -> httpx.Auth:
-    user, _, password = (unquote(part) for part in credentials.partition(":"))
-    way = httpx.DigestAuth if "digest" in challenge.lower() else httpx.BasicAuth
-    return way(user, password)
-
-
-async def _body(response: httpx.Response, task: SourceTask) -> bytes:
-    if response.status_code in (httpx.codes.UNAUTHORIZED, httpx.codes.FORBIDDEN):
-        raise NoFrameError(f"it answered {response.status_code}; check user and password in the source of the camera")
-    if response.is_redirect:
-        raise NoFrameError(
-            f"it answered {response.status_code}, and leads elsewhere; give the address that it leads to"
-        )
-    if response.status_code != httpx.codes.OK:
-        raise NoFrameError(f"it answered {response.status_code} {response.reason_phrase}")
-    endless = response.headers.get("content-type", "").lower().startswith("multipart/")
-    size, data, first_part = 0, bytearray(), mjpeg.FirstPart()
-    async for chunk in response.aiter_bytes():
-        size += len(chunk)
-        if size > task.most_bytes:
-            raise NoFrameError(f"it has more than the {task.most_bytes / 1e6:g} MB of ESC_MAX_FRAME_MB")
-        if not endless:
-            data += chunk
-        elif (picture := first_part.feed(chunk)) is not None:
-            return picture
-    if endless:
-        raise NoFrameError("it is a row of pictures (multipart) that ended before the first was whole")
-    return bytes(data)
+        raise CameraError(f"no answer within {task.seconds:g} s") from None
 
 
 def _frame_of_stream(relay: Relay, task: SourceTask) -> bytes:
-    # FFmpeg reads this when OpenCV is loaded for the first stream. TCP: a lost packet is a grey stripe.
-    os.environ["OPENCV_FFMPEG_CAPTURE_OPTIONS"] = f"rtsp_transport;tcp|protocol_whitelist;{PROTOCOLS}"
+    # FFmpeg reads this when OpenCV is loaded for the first stream.
+    os.environ["OPENCV_FFMPEG_CAPTURE_OPTIONS"] = "|".join(";".join(option) for option in FFMPEG_OPTIONS.items())
     import cv2
 
     limit_ms = int(task.seconds * 1000)
@@ -153,21 +108,30 @@ def _frame_of_stream(relay: Relay, task: SourceTask) -> bytes:
     )
     try:
         if not stream.isOpened():
-            raise NoFrameError(relay.why or "no stream could be opened; try the address with any player of RTSP")
+            raise CameraError(relay.why or "no stream could be opened; try the address with any player of RTSP")
         width, height = (int(stream.get(p)) for p in (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT))
         if width * height > task.most_pixels:
-            raise NoFrameError(
+            raise CameraError(
                 f"it has {width}x{height} pixels, more than the {task.most_pixels} of ESC_MAX_FRAME_PIXELS"
             )
-        for _ in range(FRAMES_PASSED_BY):
-            stream.grab()
+        _pass_by_first_frames(stream)
         whole, frame = stream.read()
         if not whole:
-            raise NoFrameError(relay.why or "the stream ended before a whole frame came")
+            raise CameraError(relay.why or "the stream ended before a whole frame came")
     finally:
         stream.release()
     _, data = cv2.imencode(".jpg", frame, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
     return data.tobytes()
+
+
+def _pass_by_first_frames(stream: cv2.VideoCapture) -> None:
+    import cv2
+
+    codec = int(stream.get(cv2.CAP_PROP_FOURCC)).to_bytes(4, "little").decode("latin-1").lower()
+    is_whole, passed = codec in SHOWN_WHOLE, 0
+    while passed < FRAMES_PASSED_BY and stream.grab():
+        is_whole = is_whole or int(stream.get(cv2.CAP_PROP_FRAME_TYPE)) == ord("I")
+        passed += is_whole
 
 
 if __name__ == "__main__":

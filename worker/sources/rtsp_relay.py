@@ -10,28 +10,31 @@ from __future__ import annotations
 
 import asyncio
 import secrets
-import ssl
 import threading
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from urllib.parse import urlsplit
 
 import httpx
 
-from worker.sources.rtsp_authorization import Authorization
-from worker.sources.rtsp_messages import LONGEST_HEAD, NotRtspError, RtspMessage, read
+from worker.sources.authorization import Authorization, denied
+from worker.sources.connection import connect
+from worker.sources.errors import CameraError
+from worker.sources.messages import LONGEST_HEAD, Message, read, redirect_in_words
 
 UNAUTHORIZED = 401
 DENIED = (UNAUTHORIZED, 403)
+UNSUPPORTED_TRANSPORT = 461
 STARTING_S = 10.0
+# What FFmpeg may speak, to the relay; `file` and the like are not among them. TCP: a lost packet is a grey stripe.
+FFMPEG_OPTIONS = {"rtsp_transport": "tcp", "protocol_whitelist": "rtsp,rtp,tcp"}
 
 
 @dataclass(frozen=True)
 class _Sent:
-    """A request as FFmpeg sent it, but for its URI, and how often it was sent on."""
+    """A request as FFmpeg sent it, but for its URI, and the ways of proving a user that were tried for it."""
 
-    request: RtspMessage
-    attempt: int
+    request: Message
+    tried: tuple[str, ...] = ()
 
 
 class Relay:
@@ -41,11 +44,10 @@ class Relay:
     stands in a URL, or None.
     """
 
-    def __init__(self, target: httpx.URL, addresses: Sequence[str], port: int, userinfo: str | None) -> None:
+    def __init__(self, target: httpx.URL, addresses: Sequence[str], userinfo: str | None) -> None:
         self._target = target
         self._addresses = addresses
-        self._port = port
-        self._authorization = None if userinfo is None else Authorization(userinfo)
+        self._authorization = Authorization(userinfo)
         # Other users of this machine reach the port as well.
         self._token = secrets.token_urlsafe(16)
         self._loop = asyncio.new_event_loop()
@@ -90,9 +92,9 @@ class Relay:
     async def _serve(self, player: asyncio.StreamReader, to_player: asyncio.StreamWriter) -> None:
         try:
             first = await read(player)
-            if not isinstance(first, RtspMessage) or self._here not in first.first:
+            if not isinstance(first, Message) or self._here not in first.first:
                 return
-            camera, to_camera = await self._connect()
+            camera, to_camera = await connect(self._target, self._addresses)
             try:
                 talk = _Talk(self, to_camera, to_player)
                 await talk.ask(first)
@@ -104,46 +106,29 @@ class Relay:
                     task.result()
             finally:
                 to_camera.close()
-        except _Refused as refused:
-            self._why = str(refused)
-        except NotRtspError:
-            self._why = "what it says is not RTSP"
+        except CameraError as error:
+            self._why = str(error)
         except asyncio.CancelledError:
             # The relay ends, and this with it; asyncio would report a server's task that ends so.
             pass
         except OSError as error:
-            self._why = self._why or f"it cannot be reached: {error.strerror or error}"
+            self._why = self._why or f"the connection broke off: {error.strerror or error}"
         finally:
             to_player.close()
 
-    async def _connect(self) -> tuple[asyncio.StreamReader, asyncio.StreamWriter]:
-        tls = _tls() if self._target.scheme == "rtsps" else None
-        name = self._target.host if tls else None
-        failed = OSError("it has no address")
-        for address in self._addresses:
-            try:
-                return await asyncio.open_connection(
-                    address, self._port, ssl=tls, server_hostname=name, limit=LONGEST_HEAD
-                )
-            except OSError as error:
-                failed = error
-        raise failed
-
-    def meant(self, request: RtspMessage) -> RtspMessage:
+    def meant(self, request: Message) -> Message:
         """The request with the camera's address in place of the relay's."""
         there = f"{self._target.scheme}://{self._target.netloc.decode('ascii')}"
         return replace(request, first=request.first.replace(self._here, there, 1))
 
-    def signed(self, request: RtspMessage) -> str | None:
+    def signed(self, request: Message) -> str | None:
         """Return the credentials of a request, where the camera has asked for them."""
         words = request.first.split()
-        if self._authorization is None or len(words) < 2:
-            return None
-        return self._authorization.header(words[0], words[1])
+        return self._authorization.header(words[0], words[1]) if len(words) > 1 else None
 
-    def can_sign(self, asked: RtspMessage) -> bool:
-        """Take in how a 401 asks for a user; says whether that can be answered."""
-        return self._authorization is not None and self._authorization.asked(asked.all("WWW-Authenticate"))
+    def choose_signature(self, asked: Message, tried: Sequence[str]) -> str | None:
+        """Take in how a 401 asks for a user; return the name of the way that is signed by, None if there is none."""
+        return self._authorization.choose(asked.all("WWW-Authenticate"), tried)
 
     def failed(self, why: str) -> None:
         """Keep what the camera answered, for whoever asks why there is no stream."""
@@ -170,70 +155,51 @@ class _Talk:
                 await self.ask(said)
 
     async def responses(self, camera: asyncio.StreamReader) -> None:
-        """Pass on what the camera says, until it says no more; raises `_Refused` for a redirect and for a denial."""
+        """Pass on what the camera says, until it says no more; raises `CameraError` for a redirect and for a denial."""
         while (said := await read(camera)) is not None:
             if isinstance(said, bytes):
                 await _send(self._to_player, said)
             elif said.is_response:
                 await self._answered(said)
             elif said.method == "REDIRECT":
-                raise _Refused(_leads(said, "it told the service to go on"))
+                raise CameraError(redirect_in_words(said, "it told the service to go on"))
 
-    async def ask(self, request: RtspMessage) -> None:
+    async def ask(self, request: Message) -> None:
         """Send a request of FFmpeg's to the camera."""
-        await self._ask(self._relay.meant(request), 1)
+        await self._ask(_Sent(self._relay.meant(request)))
 
-    async def _ask(self, request: RtspMessage, attempt: int) -> None:
+    async def _ask(self, sent: _Sent) -> None:
         self._number += 1
-        signature = self._relay.signed(request)
-        sent = request.having("CSeq", str(self._number))
+        signature = self._relay.signed(sent.request)
+        signed = sent.request.having("CSeq", str(self._number))
         if signature is not None:
-            sent = sent.having("Authorization", signature)
-        self._open[str(self._number)] = _Sent(request, attempt)
-        await _send(self._to_camera, sent.encoded())
+            signed = signed.having("Authorization", signature)
+        self._open[str(self._number)] = sent
+        await _send(self._to_camera, signed.encoded())
 
-    async def _answered(self, response: RtspMessage) -> None:
+    async def _answered(self, response: Message) -> None:
         sent = self._open.pop("".join(response.all("CSeq")), None)
         if sent is None:
             return
-        method = sent.request.method
-        if 300 <= response.status < 400:
-            raise _Refused(_leads(response, f"it answered {response.status} to {method} and leads"))
-        # The second time with user and password, or with a younger nonce; then they are wrong.
-        if response.status == UNAUTHORIZED and sent.attempt == 1 and self._relay.can_sign(response):
-            await self._ask(sent.request, 2)
-            return
-        if response.status in DENIED:
+        method, status = sent.request.method, response.status
+        if 300 <= status < 400:
+            raise CameraError(redirect_in_words(response, f"it answered {status} to {method} and leads"))
+        if status == UNAUTHORIZED:
+            way = self._relay.choose_signature(response, sent.tried)
+            if way is not None:
+                await self._ask(replace(sent, tried=(*sent.tried, way)))
+                return
+        if status in DENIED:
             # FFmpeg would ask again, and cameras lock users out that try too often.
-            advice = "check address, user and password with any player of RTSP"
-            raise _Refused(f"it answered {response.status} to {method}; {advice}")
-        if response.status >= 400:
-            self._relay.failed(f"it answered {response.status} to {method}")
+            raise CameraError(denied(status, response.all("WWW-Authenticate"), f" to {method}"))
+        if status == UNSUPPORTED_TRANSPORT:
+            raise CameraError(
+                f"it answered {status} to {method}: it sends its stream by UDP only, and the service takes TCP. Set it "
+                "to TCP (interleaved), or put go2rtc or MediaMTX between"
+            )
+        if status >= 400:
+            self._relay.failed(f"it answered {status} to {method}")
         await _send(self._to_player, response.having("CSeq", "".join(sent.request.all("CSeq"))).encoded())
-
-
-class _Refused(Exception):  # noqa: N818
-    """The camera leads to another address, which the message names, or denies the user."""
-
-
-def _leads(message: RtspMessage, said: str) -> str:
-    """What is told of a redirect: the host that it leads to, and nothing of the address that may be a secret."""
-    try:
-        parts = urlsplit("".join(message.all("Location")))
-        host = f"[{parts.hostname}]" if ":" in (parts.hostname or "") else parts.hostname
-        port = "" if parts.port is None else f":{parts.port}"
-    except ValueError:
-        host, port = None, ""
-    place = f"{parts.scheme}://{host}{port}" if host and f"{parts.scheme}{host}".isprintable() else "another address"
-    return f"{said} to {place[:200]}, which is not followed; give the address that it leads to"
-
-
-def _tls() -> ssl.SSLContext:
-    """Encryption without a look at the certificate: cameras sign their own."""
-    context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
-    context.check_hostname = False
-    context.verify_mode = ssl.CERT_NONE
-    return context
 
 
 async def _send(to: asyncio.StreamWriter, data: bytes) -> None:

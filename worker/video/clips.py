@@ -6,9 +6,11 @@ picture arrives, or is that of `CameraClocks`.
 
 from __future__ import annotations
 
+import re
 import sys
 import time
 from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from importlib.util import find_spec
@@ -16,8 +18,11 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
+import httpx
+
 from service import build
 from worker.calibration.geometry.camera import Camera
+from worker.sources.rtsp_relay import FFMPEG_OPTIONS, Relay
 from worker.video.camera_clocks import CameraClocks
 from worker.video.errors import VideoError
 from worker.video.stream_clock import StreamClock
@@ -76,6 +81,7 @@ class Clip:
     video: VideoStream
     facts: ClipProperties
     since: float
+    relay: ExitStack
     broken: int = field(default=0, init=False)
     sound: AudioStream | None = field(default=None, init=False)
     _clocks: CameraClocks | None = field(default=None, init=False)
@@ -92,21 +98,19 @@ class Clip:
         live = is_live(address)
         if not live and not Path(address).is_file():
             raise VideoError(f"camera {camera}: there is no file {address}")
-        options = {"rtsp_transport": "tcp"} if address.startswith("rtsp") else {}
-        try:
-            container = av.open(address, "r", options=options, timeout=(OPENING_S, WAITING_S) if live else None)
-        except (av.FFmpegError, OSError) as error:
-            raise VideoError(f"camera {camera}: {without_login(address)} is no clip: {_words(error)}") from None
-        if not container.streams.video:
-            container.close()
-            raise VideoError(f"camera {camera}: there is no video in {without_login(address)}")
-        video = container.streams.video[0]
-        video.thread_type = "AUTO"
-        told = (rate for rate in (video.average_rate, video.guessed_rate) if rate and rate <= HIGHEST_RATE)
-        rate = next(told, USUAL_RATE)
-        seconds = None if live or container.duration is None else container.duration / av.time_base
-        size = video.codec_context.width, video.codec_context.height
-        return cls(camera, address, container, video, ClipProperties(size, Fraction(rate), seconds), since)
+        with ExitStack() as relay:
+            container = _open(camera, address, relay)
+            if not container.streams.video:
+                container.close()
+                raise VideoError(f"camera {camera}: there is no video in {without_login(address)}")
+            video = container.streams.video[0]
+            video.thread_type = "AUTO"
+            told = (rate for rate in (video.average_rate, video.guessed_rate) if rate and rate <= HIGHEST_RATE)
+            rate = next(told, USUAL_RATE)
+            seconds = None if live or container.duration is None else container.duration / av.time_base
+            size = video.codec_context.width, video.codec_context.height
+            facts = ClipProperties(size, Fraction(rate), seconds)
+            return cls(camera, address, container, video, facts, since, relay.pop_all())
 
     @property
     def live(self) -> bool:
@@ -116,7 +120,7 @@ class Clip:
     @property
     def reports_clock(self) -> bool:
         """Whether its camera may tell when pictures were taken: by RTCP, which belongs to RTSP."""
-        return self.address.startswith(("rtsp://", "rtsps://"))
+        return _is_rtsp(self.address)
 
     @property
     def has_sound(self) -> bool:
@@ -181,6 +185,7 @@ class Clip:
     def close(self) -> None:
         """Let go of the file or stream."""
         self.container.close()
+        self.relay.close()
 
     def __enter__(self) -> Self:
         return self
@@ -275,11 +280,42 @@ def is_live(address: str) -> bool:
 
 def without_login(address: str) -> str:
     """An address as it may be shown: user and password of a stream are nobody's business."""
+    return _split_login(address)[0]
+
+
+def _split_login(address: str) -> tuple[str, str | None]:
+    """Return an address without user and password, and these as they stand in it."""
     scheme, separator, rest = address.partition("://")
-    if not separator:
-        return address
-    host, slash, path = rest.partition("/")
-    return f"{scheme}://{host.rpartition('@')[2]}{slash}{path}"
+    authority = re.match("[^/?#]*", rest)
+    if not separator or authority is None:
+        return address, None
+    login, at, host = authority[0].rpartition("@")
+    return f"{scheme}://{host}{rest[authority.end() :]}", login if at else None
+
+
+def _is_rtsp(address: str) -> bool:
+    return address.startswith(("rtsp://", "rtsps://"))
+
+
+def _open(camera: str, address: str, stack: ExitStack) -> InputContainer:
+    """Open a file, or a stream: one of RTSP through a relay, which `stack` ends. Raises `VideoError`."""
+    import av
+
+    shown, login = _split_login(address)
+    relay = None
+    try:
+        if _is_rtsp(address):
+            target = httpx.URL(shown)
+            relay = stack.enter_context(Relay(target, [target.host], login))
+        return av.open(
+            address if relay is None else relay.url,
+            "r",
+            options={} if relay is None else FFMPEG_OPTIONS,
+            timeout=(OPENING_S, WAITING_S) if is_live(address) else None,
+        )
+    except (av.FFmpegError, OSError, httpx.InvalidURL) as error:
+        why = (relay and relay.why) or _words(error)
+        raise VideoError(f"camera {camera}: {shown} is no clip: {why}") from None
 
 
 def _decoded(packet: Packet[VideoStream]) -> tuple[list[av.VideoFrame], int]:

@@ -157,12 +157,12 @@ def test_a_password_does_not_follow_a_source_to_another_host(service, camera, na
     ("path", "kind", "says"),
     [
         ("/gone", "source-failed", "404"),
-        ("/basic", "source-failed", "check user and password"),
-        ("/elsewhere", "source-failed", "leads elsewhere"),
+        ("/basic", "source-failed", "check address, user and password"),
+        ("/elsewhere", "source-failed", "it answered 302 and leads to another address"),
         ("/endless", "source-failed", "ESC_MAX_FRAME_MB"),
         ("/mjpeg-short", "source-failed", "ended before the first was whole"),
         ("/mjpeg-never-whole", "source-failed", "ESC_MAX_FRAME_MB"),
-        ("/text", "not-an-image", "as JPEG or PNG"),
+        ("/text", "source-failed", "a web page in place of a picture"),
         ("/small", "frame-size", "64x48"),
     ],
 )

@@ -1,9 +1,12 @@
 import pytest
+from pydantic import TypeAdapter, ValidationError
 
-from service.schemas.hosts import is_permitted
+from service.schemas.addresses import SourceUrl
+from service.schemas.hosts import is_permitted, permitted_addresses
 from service.schemas.source_urls import SourceSecrets, UnknownSecret, hide_secrets, secrets_of, with_parameters
 from service.settings import Settings
 
+PIN = "tls_sha256=" + "9f" * 32
 LAN = ["*.cams.lan", "10.1.0.0/16", "fd00::/8"]
 
 
@@ -26,6 +29,34 @@ LAN = ["*.cams.lan", "10.1.0.0/16", "fd00::/8"]
 )
 def test_a_host_is_asked_if_its_name_or_all_its_addresses_are_named(host, addresses, allowed):
     assert is_permitted(host, addresses, LAN) == allowed
+
+
+def test_of_a_host_at_several_addresses_those_alone_are_permitted_that_are_named():
+    found = ["::1", "127.0.0.1", "10.9.9.9"]
+    assert permitted_addresses("localhost", found, ["127.0.0.0/8"]) == ["127.0.0.1"]
+    assert permitted_addresses("localhost", found, ["localhost"]) == found
+    assert permitted_addresses("localhost", found, ["10.1.0.0/16"]) == []
+
+
+@pytest.mark.parametrize(
+    ("source", "is_taken"),
+    [
+        (f"https://h/a.jpg#{PIN}", True),
+        ("rtsps://h/live#tls_sha256=" + ":".join(["9F"] * 32), True),
+        (f"http://h/a.jpg#{PIN}", False),
+        (f"rtsp://h/live#{PIN}", False),
+        (f"https://h/a.jpg#{PIN}0", False),
+        ("https://h/a.jpg#", False),
+        ("https://h/a.jpg#top", False),
+    ],
+)
+def test_a_source_is_pinned_to_a_certificate_where_it_has_one(source, is_taken):
+    taken = TypeAdapter(SourceUrl)
+    if is_taken:
+        assert taken.validate_python(source) == source
+    else:
+        with pytest.raises(ValidationError, match="a certificate's SHA-256"):
+            taken.validate_python(source)
 
 
 def test_a_wildcard_names_no_address():
@@ -58,6 +89,8 @@ SECRET = [
     ("rtsp://h/user=admin&password=x/stream?token=t", "rtsp://h/user=***&password=***/stream?token=***", None),
     ("http://u:p@h?PASSWORD=Two", "http://***@h?PASSWORD=***", "u:p?PASSWORD=Two"),
     ("http://h/?pwd=one&pwd=two&pwd=", "http://h/?pwd=***&pwd=***&pwd=", "?pwd=one&pwd=two"),
+    (f"rtsps://u:p@h/live?pwd=x#{PIN}", f"rtsps://***@h/live?pwd=***#{PIN}", "u:p?pwd=x"),
+    (f"https://h/user=a#{PIN}", f"https://h/user=***#{PIN}", "?user=a"),
     ("http://h/bypass=1?author=me&keyboard=x", "http://h/bypass=1?author=me&keyboard=x", ""),
 ]
 

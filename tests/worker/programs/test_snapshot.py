@@ -1,11 +1,15 @@
 """A frame of an RTSP stream, from cameras that speak it over real sockets."""
 
+import re
 import socket
 import subprocess
 import sys
 import threading
 import time
+from base64 import b64encode
+from fractions import Fraction
 
+import av
 import cv2
 import httpx
 import numpy as np
@@ -17,7 +21,7 @@ from service.schemas.venue import VenueIn
 from service.settings import Settings
 from tests.e2e.running import venue
 from tests.worker.certificates import certificate
-from tests.worker.sources.streaming_camera import ASKS, SIZE, StreamingCamera
+from tests.worker.sources.streaming_camera import ASKS, SIZE, Film, Stranger, StreamingCamera
 from worker.sources.rtsp_relay import Relay
 
 pytestmark = pytest.mark.slow
@@ -37,32 +41,6 @@ def camera():
     yield camera
     for one in cameras:
         one.close()
-
-
-class Stranger:
-    """A host that a camera leads to: keeps what is said to it."""
-
-    def __init__(self) -> None:
-        self.heard: list[bytes] = []
-        self._listener = socket.create_server(("127.0.0.1", 0))
-        self.host = "{}:{}".format(*self._listener.getsockname())
-        threading.Thread(target=self._listen, daemon=True).start()
-
-    def _listen(self) -> None:
-        while True:
-            try:
-                connection, _ = self._listener.accept()
-            except OSError:
-                return
-            self.heard.append(b"a connection")
-            with connection:
-                connection.sendall(b'RTSP/1.0 401 Unauthorized\r\nCSeq: 1\r\nWWW-Authenticate: Basic realm="x"\r\n\r\n')
-                connection.settimeout(5)
-                while data := connection.recv(4096):
-                    self.heard.append(data)
-
-    def close(self) -> None:
-        self._listener.close()
 
 
 @pytest.fixture
@@ -99,9 +77,16 @@ def test_a_frame_of_a_stream_is_what_the_camera_sees(camera, tmp_path, way):
         assert not [given for _, given in seen.asked if given.startswith("Basic")]
 
 
-def test_an_encrypted_stream_is_taken_from_a_camera_that_signed_its_own_certificate(camera, tmp_path):
+def test_a_camera_that_signed_its_own_certificate_is_taken_from_by_the_pin_that_its_refusal_shows(camera, tmp_path):
     seen = camera(certificate=certificate(tmp_path, "camera.example"))
-    assert taken(tmp_path, f"rtsps://***@{seen.host}/live", RIGHT)
+    said = refused(tmp_path, f"rtsps://***@{seen.host}/live", RIGHT)
+    pin = re.search("#tls_sha256=[0-9a-f]{64}", said)[0]
+    assert "cannot be verified (self-signed certificate)" in said
+    assert seen.asked == []
+    assert taken(tmp_path, f"rtsps://***@{seen.host}/live{pin}", RIGHT)
+    asked = len(seen.asked)
+    assert pin in refused(tmp_path, f"rtsps://***@{seen.host}/live#tls_sha256={'0' * 64}", RIGHT)
+    assert len(seen.asked) == asked
 
 
 def test_a_stream_that_is_refused_says_what_to_look_at(camera, tmp_path):
@@ -131,7 +116,7 @@ def test_a_camera_that_leads_elsewhere_is_not_followed_and_its_password_stays_wi
 def test_nobody_else_on_the_machine_speaks_to_the_camera_through_the_relay(camera):
     seen = camera()
     target = httpx.URL(f"rtsp://{seen.host}/live")
-    with Relay(target, ["127.0.0.1"], target.port, RIGHT) as relay:
+    with Relay(target, ["127.0.0.1"], RIGHT) as relay:
         there = httpx.URL(relay.url)
         with socket.create_connection((there.host, there.port)) as guess:
             guess.sendall(f"OPTIONS rtsp://127.0.0.1:{there.port}/live RTSP/1.0\r\nCSeq: 1\r\n\r\n".encode())
@@ -145,9 +130,14 @@ def test_nobody_else_on_the_machine_speaks_to_the_camera_through_the_relay(camer
 
 
 @pytest.mark.parametrize(
-    "says", [b"HTTP/1.1 400 Bad Request\r\n\r\n", b"RTSP/1.0 x\r\nCSeq: 1\r\n\r\n", b"A" * 200_000]
+    ("says", "words"),
+    [
+        (b"HTTP/1.1 400 Bad Request\r\n\r\n", "it speaks HTTP at this address"),
+        (b"RTSP/1.0 x\r\nCSeq: 1\r\n\r\n", "neither RTSP nor HTTP"),
+        (b"A" * 200_000, "its head has no end"),
+    ],
 )
-def test_what_does_not_speak_rtsp_is_called_so(tmp_path, says):
+def test_what_does_not_speak_rtsp_is_called_so(tmp_path, says, words):
     with socket.create_server(("127.0.0.1", 0)) as listener:
 
         def answer():
@@ -159,7 +149,7 @@ def test_what_does_not_speak_rtsp_is_called_so(tmp_path, says):
 
         threading.Thread(target=answer, daemon=True).start()
         said = refused(tmp_path, "rtsp://{}:{}/live".format(*listener.getsockname()), None)
-    assert "what it says is not RTSP" in said
+    assert words in said
 
 
 def test_the_program_loads_no_models_of_venues_and_results():
@@ -168,3 +158,70 @@ def test_the_program_loads_no_models_of_venues_and_results():
     told = subprocess.run([sys.executable, "-c", modules], capture_output=True, text=True, check=True)
     assert "service.schemas.programs.sources" in told.stdout.split()
     assert not {"service.intake", "service.schemas.venue", "service.schemas.results"} & set(told.stdout.split())
+
+
+def encoded(codec, rate=25, frames=120, **options) -> list[bytes]:
+    """Pictures of a noisy ground over which a bar goes, encoded; each has it a pixel further."""
+    context = av.CodecContext.create(codec, "w")
+    context.width, context.height = GROUND.shape[1::-1]
+    context.pix_fmt, context.time_base, context.framerate, context.bit_rate = "yuv420p", Fraction(1, rate), rate, 10**6
+    context.options = {name.replace("_", "-"): value for name, value in options.items()}
+    packets = []
+    for number in range(frames):
+        frame = av.VideoFrame.from_ndarray(with_bar(number), format="bgr24")
+        frame.pts = number
+        packets += context.encode(frame)
+    return [bytes(packet) for packet in [*packets, *context.encode(None)]]
+
+
+def with_bar(number):
+    picture = GROUND.copy()
+    at = number % (SIZE[0] - 8)
+    picture[:, at : at + 8] = 255
+    return picture
+
+
+GROUND = np.random.default_rng(1).integers(40, 200, (6, 8, 3), np.uint8).repeat(8, 0).repeat(8, 1)
+# Less than a picture has.
+LONGEST_PAYLOAD = 300
+HEAD = "v=0\r\no=- 0 0 IN IP4 127.0.0.1\r\ns=c\r\nt=0 0\r\n"
+SDP = HEAD + "m=video 0 RTP/AVP 96\r\na=rtpmap:96 {}/90000\r\na=fmtp:96 {}\r\n"
+
+
+def mpeg4_film(joined_at) -> Film:
+    """A stream of MPEG-4 Visual (RFC 6416) that is joined in the middle of a group of pictures."""
+    pictures = encoded("mpeg4", g="50")
+    config = pictures[0][: pictures[0].index(b"\0\0\1\xb6")].hex()
+    cut = [
+        [picture[at : at + LONGEST_PAYLOAD] for at in range(0, len(picture), LONGEST_PAYLOAD)]
+        for picture in pictures[joined_at:]
+    ]
+    return Film(SDP.format("MP4V-ES", f"profile-level-id=1;config={config}"), 96, cut)
+
+
+def refreshed_film(joined_at) -> Film:
+    """A stream of H.264 (RFC 6184) without key frames but its first, which is refreshed column by column."""
+    pictures = encoded("libx264", tune="zerolatency", x264_params="intra-refresh=1:keyint=40:sliced-threads=0")
+    units = [[unit.rstrip(b"\0") for unit in picture.split(b"\0\0\1") if unit.strip(b"\0")] for picture in pictures]
+    sets = ",".join(b64encode(unit).decode() for unit in units[0] if unit[0] & 31 in (7, 8))
+    cut = [[payload for unit in picture for payload in h264_payloads(unit)] for picture in units[joined_at:]]
+    return Film(SDP.format("H264", f"packetization-mode=1;sprop-parameter-sets={sets}"), 96, cut)
+
+
+def h264_payloads(unit) -> list[bytes]:
+    """A unit as it is, or in fragments (FU-A)."""
+    if len(unit) <= LONGEST_PAYLOAD:
+        return [unit]
+    pieces = [unit[at : at + LONGEST_PAYLOAD] for at in range(1, len(unit), LONGEST_PAYLOAD)]
+    flags = [0x80, *[0] * (len(pieces) - 2), 0x40]
+    return [
+        bytes([unit[0] & 0xE0 | 28, flag | unit[0] & 31]) + piece for flag, piece in zip(flags, pieces, strict=True)
+    ]
+
+
+@pytest.mark.parametrize("film", [mpeg4_film, refreshed_film])
+def test_a_stream_that_is_joined_in_the_middle_gives_a_frame_after_it_has_become_whole(camera, tmp_path, film):
+    seen = camera(film=film(joined_at=10))
+    frame = taken(tmp_path, f"rtsp://***@{seen.host}/live", RIGHT)
+    picture = cv2.imdecode(np.frombuffer(frame, np.uint8), cv2.IMREAD_COLOR)
+    assert min(np.abs(picture.astype(int) - with_bar(number)).mean() for number in range(120)) < 8

@@ -154,7 +154,7 @@ def test_ffmpeg_shows_the_demo_as_the_service_does(ffmpeg, tmp_path):
     shown, expected = cv2.imread(str(tmp_path / "view.png")), made.picture(read(files))
     agrees(shown, expected, at_most=6)
     # Neither ffmpeg's whole log nor warnings that the script is to blame for.
-    assert not re.search("option is deprecated|Input #|Stream #", done.stderr)
+    assert not re.search("deprecated|image sequence|Input #|Stream #", done.stderr)
     assert np.abs(apart_px(shown, expected)).max() < 0.1
 
 

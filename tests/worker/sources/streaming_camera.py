@@ -8,6 +8,8 @@ import struct
 import threading
 from base64 import b64encode
 from contextlib import suppress
+from dataclasses import dataclass
+from itertools import count, cycle
 from pathlib import Path
 
 import cv2
@@ -24,11 +26,47 @@ SIZE = (64, 48)
 SDP = "v=0\r\no=- 0 0 IN IP4 127.0.0.1\r\ns=c\r\nt=0 0\r\nm=video 0 RTP/AVP 26\r\na=control:track1\r\n"
 
 
-class StreamingCamera:
-    """Motion JPEG by RTSP (RFC 2326) in RTP (RFC 2435), interleaved in one TCP connection, for user:pass word.
+@dataclass(frozen=True)
+class Film:
+    """What a camera sends again and again: the payloads of the packets of each picture."""
 
-    `way`: how it asks for them. `leads`: the methods that it answers with a redirect, and where that leads. `asked`:
-    the requests that came, each with what proved its user.
+    sdp: str
+    payload_type: int
+    pictures: list[list[bytes]]
+
+
+class Stranger:
+    """A host that a camera leads to: keeps what is said to it."""
+
+    def __init__(self) -> None:
+        self.heard: list[bytes] = []
+        self._listener = socket.create_server(("127.0.0.1", 0))
+        self.host = "{}:{}".format(*self._listener.getsockname())
+        threading.Thread(target=self._listen, daemon=True).start()
+
+    def _listen(self) -> None:
+        while True:
+            try:
+                connection, _ = self._listener.accept()
+            except OSError:
+                return
+            self.heard.append(b"a connection")
+            with connection:
+                connection.sendall(b'RTSP/1.0 401 Unauthorized\r\nCSeq: 1\r\nWWW-Authenticate: Basic realm="x"\r\n\r\n')
+                connection.settimeout(5)
+                while data := connection.recv(4096):
+                    self.heard.append(data)
+
+    def close(self) -> None:
+        self._listener.close()
+
+
+class StreamingCamera:
+    """A stream by RTSP (RFC 2326), interleaved in one TCP connection, for user:pass word.
+
+    `way`: how it asks for them. `leads`: the methods that it answers with a redirect, and where that leads. `film`:
+    what it sends in place of Motion JPEG (RFC 2435) of one `shade`. `asked`: the requests that came, each with what
+    proved its user.
     """
 
     def __init__(
@@ -37,6 +75,7 @@ class StreamingCamera:
         way: str = "basic",
         leads: dict[str, str] | None = None,
         certificate: Path | None = None,
+        film: Film | None = None,
     ) -> None:
         self.asked: list[tuple[str, str]] = []
         self._way, self._leads = way, leads or {}
@@ -45,7 +84,7 @@ class StreamingCamera:
             self._tls = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
             self._tls.load_cert_chain(certificate)
         frame = np.full((SIZE[1], SIZE[0], 3), shade, np.uint8)
-        self._payload = _rtp_payload(cv2.imencode(".jpg", frame)[1].tobytes())
+        self._film = film or Film(SDP, 26, [[_rtp_payload(cv2.imencode(".jpg", frame)[1].tobytes())]])
         self._listener = socket.create_server(("127.0.0.1", 0))
         self.host = "{}:{}".format(*self._listener.getsockname())
         threading.Thread(target=self._accept, daemon=True).start()
@@ -89,7 +128,7 @@ class StreamingCamera:
             case _ if not self._knows(method, uri, headers.get("authorization", "")):
                 status, more = "401 Unauthorized", {"WWW-Authenticate": ASKS[self._way]}
             case "DESCRIBE":
-                body, more = SDP, {"Content-Type": "application/sdp"}
+                body, more = self._film.sdp, {"Content-Type": "application/sdp"}
             case "SETUP":
                 more = {"Transport": "RTP/AVP/TCP;unicast;interleaved=0-1", "Session": "1"}
             case "PLAY":
@@ -113,12 +152,15 @@ class StreamingCamera:
         return given.startswith("Digest ") and fields.get("uri") == uri and fields.get("response") == expected
 
     def _play(self, connection, stop) -> None:
-        number = 0
+        numbers = count()
         with suppress(OSError):
-            while not stop.wait(0.04):
-                packet = struct.pack(">BBHII", 0x80, 0x80 | 26, number & 0xFFFF, number * 3600, 7) + self._payload
-                connection.sendall(b"$\0" + struct.pack(">H", len(packet)) + packet)
-                number += 1
+            for at, picture in enumerate(cycle(self._film.pictures)):
+                if stop.wait(0.04):
+                    return
+                for payload in picture:
+                    kind = self._film.payload_type | (0x80 if payload is picture[-1] else 0)
+                    packet = struct.pack(">BBHII", 0x80, kind, next(numbers) & 0xFFFF, at * 3600, 7) + payload
+                    connection.sendall(b"$\0" + struct.pack(">H", len(packet)) + packet)
 
 
 def _rtp_payload(jpeg: bytes) -> bytes:

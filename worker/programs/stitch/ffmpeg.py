@@ -213,13 +213,18 @@ def _command(cameras: Sequence[str], maps: Sequence[str]) -> str:
             "set -eu",
             f'if [ $# -ne {count + 1} ]; then echo "usage: $0 {" ".join(names)} OUTPUT" >&2; exit 2; fi',
             'here=$(dirname "$0")',
-            f'case "$1" in *.jpg | *.jpeg | *.JPG | *.JPEG) still={STILLS} ;; *) still={VIDEO} ;; esac',
+            # Of each JPEG ffmpeg warns that its pixel format is deprecated, which it is in ffmpeg's own terms alone.
+            f'case "$1" in *.jpg | *.jpeg | *.JPG | *.JPEG) still={STILLS} level=error ;; '
+            f"*) still={VIDEO} level=warning ;; esac",
             f'case "${{{count + 1}}}" in *.png | *.PNG) pixels=yuv444p ;; *) pixels={PIXELS} ;; esac',
+            # Otherwise ffmpeg misses the number of a sequence in the name of one picture.
+            f'case "${{{count + 1}}}" in *%*) one= ;; '
+            "*.png | *.PNG | *.jpg | *.jpeg | *.JPG | *.JPEG) one='-frames:v 1 -update 1' ;; *) one= ;; esac",
             f'graph=$(sed -e "s/in_color_matrix={VIDEO}/in_color_matrix=${{MATRIX:-$still}}/" \\',
             f'  -e "s/format={PIXELS}/format=${{PIXELS:-$pixels}}/" "$here/{SCRIPT}")',
-            "exec ffmpeg -hide_banner -loglevel warning -stats \\",
+            "exec ffmpeg -hide_banner -loglevel $level -stats \\",
             *(f"  {'${FFMPEG_IN:-} ' if number < count else ''}{one} \\" for number, one in enumerate(inputs)),
-            f'  -filter_complex "$graph" -map "[stitched]" ${{FFMPEG_OUT:-}} "${{{count + 1}}}"',
+            f'  -filter_complex "$graph" -map "[stitched]" $one ${{FFMPEG_OUT:-}} "${{{count + 1}}}"',
             "",
         ]
     )
