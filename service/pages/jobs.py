@@ -58,6 +58,7 @@ def job(job_id: JobIdPath, request: Request, context: InContext) -> Response:
     if found is None:
         kept = f"{context.settings.keep_jobs_days:g} days"
         raise Problem("job-not-found", f"It was deleted: by somebody, or since it ended more than {kept} ago.")
+    venue = context.venues.get(found.venue) if found.venue else None
     newest = context.venues.history(found.venue, None, 1) if found.venue and found.kind == "calibration" else []
     return render_page(
         request,
@@ -66,11 +67,13 @@ def job(job_id: JobIdPath, request: Request, context: InContext) -> Response:
         stages=STAGES,
         formats=get_args(FormatName),
         holds=bool(newest) and poses_are_current(found, newest[0]),
-        sizes=sizes_of(context.venues.get(found.venue) if found.venue else None),
+        sizes=sizes_of(venue),
         decidable=context.decisions.decidable(job_id),
         adoptable=context.adopted_fields.adoptable(job_id),
         can_take=found.kind == "find" and context.found_venues.is_adoptable(job_id),
-        is_stored=found.venue is not None and context.venues.get(found.venue) is not None,
+        is_stored=venue is not None,
+        # A new venue has those cameras alone that the search had frames of.
+        has_every_frame=bool(found.frames) and (venue is None or venue.poses.keys() <= found.frames.keys()),
         can_be_repeated=can_be_resubmitted(context, found),
     )
 

@@ -25,14 +25,25 @@ async function take(event) {
   event.preventDefault();
   const refused = document.getElementById("refused");
   button.disabled = refused.hidden = true;
+  const venue = `${root}/ui/venues/${form.dataset.venue}`;
   const candidates = Object.fromEntries(cameras.map((camera) => [camera, chosen(camera)]));
   try {
     await call("POST", `${root}/venues/${form.dataset.venue}/adopt-found`, {job: form.dataset.job, candidates});
-    location.assign(`${root}/ui/venues/${form.dataset.venue}`);
   } catch (problem) {
     refused.textContent = problem.message;
     refused.hidden = false;
-    tell();
+    return tell();
+  }
+  if (!("calibrates" in form.dataset)) return location.assign(venue);
+  try {
+    const job = await call("POST", `${root}/jobs/${form.dataset.job}/calibrate`);
+    return location.assign(`${root}/ui/jobs/${job.id}`);
+  } catch (problem) {
+    const link = document.createElement("a");
+    link.href = venue;
+    link.textContent = "To the venue";
+    refused.replaceChildren(`The poses are stored, but not calibrated yet. ${problem.message} `, link);
+    refused.hidden = false;
   }
 }
 
