@@ -9,6 +9,7 @@ import os
 import signal
 import sys
 import time
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 from service import child_process
@@ -69,6 +70,9 @@ def main() -> None:
         say(progress={"stage": "evolution", "fraction": 0.5, "generation": 7, "loss": 0.3})
     match behaviour:
         case "hang":
+            if task["kind"] == "find":
+                end = datetime.now(UTC) + timedelta(seconds=150)
+                say(progress={"stage": "evolution", "fraction": 0.5, "expected_end": end.isoformat()})
             time.sleep(3600)
         case "crash":
             os.kill(os.getpid(), signal.SIGSEGV)

@@ -1,4 +1,4 @@
-"""Firefox without windows, spoken to by Marionette, which it brings along: Playwright drives only a build of its own."""
+"""Firefox without windows, spoken to by its own Marionette: Playwright drives only a build of its own."""
 
 import json
 import shutil

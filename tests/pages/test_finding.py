@@ -113,6 +113,13 @@ def test_a_camera_of_a_venue_is_found_again_and_its_neighbour_stays(stub, visit,
     assert [depth(stub.http.get(f"/venues/{name}").json(), camera) for camera in ("left", "right")] == [40, 50]
 
 
+def test_a_search_says_how_long_it_will_still_take(stub, visit, name):
+    job = find(stub, name, place=site(name, "hang")).json()
+    page = visit(stub.url, f"/ui/jobs/{job['id']}")
+    expect(page.get_by_text("search, about 3 min left")).to_be_visible()
+    stub.http.post(f"/jobs/{job['id']}/cancel")
+
+
 def test_a_search_is_followed_to_its_end(stub, visit, name):
     job = find(stub, name, place=site(name, "accept 1")).json()
     page = visit(stub.url, f"/ui/jobs/{job['id']}")

@@ -1,4 +1,4 @@
-"""Pictures whose Exif says that the camera was held otherwise: a browser shows their pixels as the service takes them."""
+"""Pictures whose Exif says that the camera was held otherwise: browsers show their pixels as they are stored."""
 
 import struct
 import zlib

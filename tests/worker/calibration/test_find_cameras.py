@@ -50,8 +50,16 @@ def test_what_was_assumed_of_the_side_is_said():
 
 def test_progress_grows_from_stage_to_stage():
     _, steps = both()
+    _, steps = both()
     assert [step.fraction for step in steps] == sorted(step.fraction for step in steps)
     assert list(dict.fromkeys(step.stage for step in steps)) == ["segmentation", "evolution", "refinement"]
+
+
+def test_each_camera_that_is_searched_for_says_how_long_the_others_will_take():
+    _, steps = both()
+    first, second = (step.remaining_s for step in steps if step.remaining_s is not None)
+    assert first > 0
+    assert second > 0
 
 
 def test_a_camera_is_found_beside_one_that_is_known():
