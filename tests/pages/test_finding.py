@@ -85,6 +85,36 @@ def test_where_several_poses_explain_a_frame_a_person_chooses_by_a_click(stub, v
     expect(button).to_have_count(0)
 
 
+def test_what_was_found_is_said_not_to_be_saved_and_how_well_it_is_known(stub, visit, name):
+    page = visit(stub.url, f"/ui/jobs/{found(stub, name, place=site(name))['id']}")
+    expect(page.get_by_text("Found, not saved yet")).to_be_visible()
+    expect(page.get_by_text("Accepted")).to_have_count(0)
+    expect(page.get_by_text("± 17.0 cm, 0.350°").first).to_be_visible()
+    expect(page.get_by_text("Agreement")).to_have_count(0)
+
+
+def test_cameras_whose_side_is_assumed_are_swapped_by_a_click(stub, visit, name):
+    page = visit(stub.url, f"/ui/jobs/{found(stub, name, place=site(name))['id']}")
+    swap = page.get_by_role("button", name="Swap: it stands on the far side")
+    for position in ("0.0, -60.0, 8.0 m", "0.0, -40.0, 8.0 m", "0.0, -60.0, 8.0 m"):
+        swap.click()
+        expect(page.get_by_text(position).locator("visible=true")).to_have_count(2)
+    page.get_by_role("button", name="Create the venue").click()
+    expect(page.get_by_role("heading", name=f"Calibration of {name}")).to_be_visible()
+    stub.end(page.url.rpartition("/")[2])
+    # The stub of a calibration moves each camera an eighth of the way nearer.
+    assert [depth(stub.http.get(f"/venues/{name}").json(), camera) for camera in ("left", "right")] == [52.5, 52.5]
+
+
+def test_a_search_that_failed_shows_three_candidates_and_what_may_help(stub, visit, name):
+    page = visit(stub.url, f"/ui/jobs/{found(stub, name, place=site(name, 'hopeless', ['left']))['id']}")
+    expect(page.get_by_text("Not all found")).to_be_visible()
+    expect(page.get_by_text("What may help: to choose the candidate")).to_be_visible()
+    expect(page.locator(".candidate:visible")).to_have_count(3)
+    page.get_by_text("What else was considered (10)").click()
+    expect(page.locator(".candidate:visible")).to_have_count(13)
+
+
 def test_what_cannot_be_taken_any_more_says_so(stub, visit, name):
     job = found(stub, name, place=site(name))
     page = visit(stub.url, f"/ui/jobs/{job['id']}", forgiven=("409",))

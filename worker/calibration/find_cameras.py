@@ -21,7 +21,7 @@ from worker.calibration.records import Calibration, Options, Progress, ProgressR
 from worker.calibration.refinement.refine import Observations
 from worker.calibration.relocalisation.candidate import Candidate
 from worker.calibration.relocalisation.crown import find_crown
-from worker.calibration.relocalisation.field_halves import choose_sides
+from worker.calibration.relocalisation.field_halves import choose_sides, side_of
 from worker.calibration.relocalisation.field_map import FieldMap
 from worker.calibration.relocalisation.relocalise import NotFound, Relocalisation, relocalise, twin
 from worker.calibration.relocalisation.rivals import tell_rivals_apart
@@ -46,13 +46,15 @@ class FoundCamera:
 
     `candidates`: cameras that may have taken its frame, the best first, for a person to choose from; a best one that is
     accepted is at the pose of a calibration that began with it. `refusal`: why the best one is not taken, None where it
-    is; `remarks`: what was assumed.
+    is; `remarks`: what was assumed. `assumed_side`: the side of a symmetric field that the best one stands on by an
+    assumption about all cameras of the search; the second one then is its twin on the other side. None: not assumed.
     """
 
     id: str
     candidates: Sequence[Candidate]
     refusal: NotFound | None
     remarks: Sequence[str]
+    assumed_side: str | None = None
 
     @property
     def accepted(self) -> bool:
@@ -138,9 +140,11 @@ def find_cameras(
             calibrated = calibrate(
                 pitch, [*found, *beside], frames, remembered, Options(seed=seed, recover="never"), stop=stop
             )
+    judged = [_judged(camera, placed[camera.id], calibrated) for camera in sought]
+    is_side_assumed = markings.is_symmetric and not known and all(by_id[one.id].place.is_anywhere for one in found)
     return FoundCameras(
         pitch,
-        [_judged(camera, placed[camera.id], calibrated) for camera in sought],
+        [_with_twin(camera) if is_side_assumed and camera.accepted else camera for camera in judged],
         None if calibrated is None else calibrated.stitch_error_px,
         progress.timings,
     )
@@ -261,6 +265,13 @@ def _judged(sought: SoughtCamera, found: Relocalisation, calibrated: Calibration
         return FoundCamera(sought.id, found.candidates, NotFound("not-confirmed", words), found.remarks)
     best, *others = found.candidates
     return FoundCamera(sought.id, [replace(best, camera=result.camera), *others], None, found.remarks)
+
+
+def _with_twin(found: FoundCamera) -> FoundCamera:
+    """The same with the twin of its best candidate behind it: all cameras of the search may stand half a turn away."""
+    best, *others = found.candidates
+    both = [best, replace(best, camera=twin(best.camera))]
+    return replace(found, candidates=[*both, *others], assumed_side=side_of(best.camera))
 
 
 def why_not_confirmed(result: CameraResult, *, is_lens_found: bool) -> str | None:

@@ -21,6 +21,20 @@ function tell() {
   form.querySelector("[data-open]").textContent = words;
 }
 
+/** Let the cameras stand half a turn about the field's centre away, as their second candidates do, or back again. */
+function swap(event) {
+  const wasSwapped = event.currentTarget.getAttribute("aria-pressed") === "true";
+  event.currentTarget.setAttribute("aria-pressed", !wasSwapped);
+  for (const section of form.querySelectorAll("[data-assumed]")) {
+    const radios = [1, 2].map((number) => section.querySelector(`input[value="${number}"]`));
+    const [from, to] = wasSwapped ? radios.reverse() : radios;
+    if (from.checked) to.checked = true;
+    from.closest("li").hidden = true;
+    to.closest("li").hidden = false;
+  }
+  tell();
+}
+
 async function take(event) {
   event.preventDefault();
   const refused = document.getElementById("refused");
@@ -50,5 +64,6 @@ async function take(event) {
 if (button) {
   form.addEventListener("input", tell);
   form.addEventListener("submit", take);
+  form.querySelector("[data-swap]")?.addEventListener("click", swap);
   tell();
 }

@@ -53,7 +53,7 @@ def test_cameras_of_known_lenses_are_found_and_the_venue_is_written(answered):
         assert np.linalg.norm(np.array(camera["pose"]["position"]) - truth.pose.position) < 0.15
     assert json.loads(out)["accepted"]
     assert "Camera left: (-0." in err
-    assert "taken: camera left stands on the near side" in err
+    assert "assumed: it stands on the near side" in err
 
 
 def test_what_was_found_calibrates(answered, tmp_path):
