@@ -7,7 +7,7 @@ from playwright.sync_api import expect
 
 from service.store.jobs.queries import ONE
 from tests.e2e.routes.test_find import depth, find, forget_frames, found, site
-from tests.e2e.running import png
+from tests.e2e.running import png, upload
 from tests.pages import browsing
 
 
@@ -107,7 +107,10 @@ def test_cameras_whose_side_is_assumed_are_swapped_by_a_click(stub, visit, name)
 
 
 def test_a_search_that_failed_shows_three_candidates_and_what_may_help(stub, visit, name):
-    page = visit(stub.url, f"/ui/jobs/{found(stub, name, place=site(name, 'hopeless', ['left']))['id']}")
+    page = visit(
+        stub.url,
+        f"/ui/jobs/{found(stub, name, files=upload(cameras=('left',)), place=site(name, 'hopeless', ['left']))['id']}",
+    )
     expect(page.get_by_text("Not all found")).to_be_visible()
     expect(page.get_by_text("What may help: to choose the candidate")).to_be_visible()
     expect(page.locator(".candidate:visible")).to_have_count(3)
