@@ -342,6 +342,10 @@ class AsyncClient:
         """Submit the frames of a job once more, from the poses in use: another job."""
         return _job(await self._ask("POST", f"/jobs/{job_id}/again"))
 
+    async def calibrate_found(self, job_id: str) -> Job:
+        """Calibrate a venue with the frames of the search whose cameras `adopt_found` has stored."""
+        return _job(await self._ask("POST", f"/jobs/{job_id}/calibrate"))
+
     async def delete_job(self, job_id: str) -> None:
         """Forget a job that has ended, with its frames and pictures."""
         await self._ask("DELETE", f"/jobs/{job_id}")
@@ -483,6 +487,7 @@ class Client:
     job = Call(AsyncClient.job)
     jobs = Call(AsyncClient.jobs)
     again = Call(AsyncClient.again)
+    calibrate_found = Call(AsyncClient.calibrate_found)
     delete_job = Call(AsyncClient.delete_job)
     cancel = Call(AsyncClient.cancel)
     accept = Call(AsyncClient.accept)

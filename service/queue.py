@@ -2,7 +2,8 @@
 
 What can be relied on: a job that was enqueued in a transaction is begun by some worker once that transaction is
 committed, `live` before `routine`, in order of submission; it is begun again when its worker died, three times in all;
-then it is given up. The queue does not know how a job ended; the job's row does.
+then it is given up. Kinds with a queue of their own neither wait for the others nor hold them up. The queue does not
+know how a job ended; the job's row does.
 """
 
 from __future__ import annotations
@@ -20,13 +21,11 @@ from dbos import Queue as EngineQueue
 from dbos import WorkflowStatusString as QueueStatus
 from dbos._core import execute_dequeued_workflow
 
-from service.schemas.names import JobKind
+from service.schemas.names import OWN_QUEUES, JobKind
 from service.store.database import LIMITS, postgresql, sqlite_file
 
 APPLICATION = "esc"
 QUEUE = "calibration"
-# For what takes a second and somebody waits for: it does not stand behind a calibration.
-LIGHT_QUEUE, LIGHT = "light", ("locate",)
 WORKFLOW = "calibrate"
 # Of the queue's own tables on PostgreSQL.
 SCHEMA = "dbos"
@@ -92,7 +91,7 @@ UNKNOWN = GivenUp("The queue does not know it", can_wait=True)
 
 
 def _queue_of(kind: JobKind) -> str:
-    return LIGHT_QUEUE if kind in LIGHT else QUEUE
+    return OWN_QUEUES.get(kind, QUEUE)
 
 
 class Queue:
@@ -129,14 +128,14 @@ class WorkerQueue:
 
     The engine's own threads ask the database a dozen times a second, whatever their options: for the settings and the
     jobs of each queue, and for queues, schedules, delays and timeouts, of which there are none. So they are stopped
-    once they run, and one thread of ours asks about both queues in one statement. Jobs are claimed and begun by the
+    once they run, and one thread of ours asks about all queues in one statement. Jobs are claimed and begun by the
     engine all the same; its private calls are those of the version that is pinned exactly.
     """
 
     def __init__(self, url: str, worker: str, jobs_at_once: int, run: Callable[[str], None]) -> None:
         self._worker = worker
         self._poll_s = POLL_FILE_S if sqlite_file(url) else POLL_S
-        self._at_once = {QUEUE: jobs_at_once, LIGHT_QUEUE: 1}
+        self._at_once = {QUEUE: jobs_at_once, **dict.fromkeys(OWN_QUEUES.values(), 1)}
         config: DBOSConfig = {
             "name": APPLICATION,
             "system_database_url": url,

@@ -192,7 +192,11 @@ class Settings(BaseSettings):
         max_length=200,
         description="Name of the worker, unique and best the same after a restart.",
     )
-    jobs_at_once: int = Field(1, ge=1, description="Jobs that one worker computes at the same time.")
+    jobs_at_once: int = Field(
+        1,
+        ge=1,
+        description="Jobs that one worker computes at the same time, beside a search for cameras and a first pose.",
+    )
     provider: Literal["cpu", "cuda", "openvino"] = Field(
         "cpu",
         description="What runs the network. `cuda` and `openvino` need `onnxruntime-gpu` or `onnxruntime-openvino` in "

@@ -38,6 +38,7 @@ PARTS = {
     "colmap": "install pycolmap, which the group dev has on machines that have a wheel of it (make setup)",
     "promtool": "install Prometheus (Debian: apt-get install prometheus)",
     "browser": "install Chromium (Debian: apt-get install chromium-headless-shell, or chromium)",
+    "firefox": "install Firefox (Debian: apt-get install firefox-esr)",
     "nginx": "install nginx (Debian: apt-get install nginx)",
     "caddy": "install Caddy (Debian: apt-get install caddy)",
     "released": "fetch the whole history, which release 0.1.0 is built from (git fetch --unshallow)",

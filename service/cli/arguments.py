@@ -153,6 +153,10 @@ AdoptedFinding = Annotated[
         help="Instead of a lens: the cameras that this job of `esc venue find` has found.",
     ),
 ]
+CalibrateFound = Annotated[
+    bool,
+    typer.Option("--calibrate", help="With --found: then calibrate the venue with the frames of that job."),
+]
 Candidates = Annotated[
     list[str] | None,
     typer.Option(

@@ -21,6 +21,7 @@ from service.cli.arguments import (
     AnswerAsJson,
     ApiKey,
     AsJson,
+    CalibrateFound,
     Candidates,
     FormatOption,
     Frames,
@@ -392,6 +393,7 @@ def find_cameras(
             if adopt_them and job.result.accepted:
                 client.adopt_found(venue, job.id)
                 print_note(f"Stored: venue {venue} has these cameras now.")
+                print_note(f"To calibrate with the same frames: esc venue adopt {venue} --found {job.id} --calibrate")
             elif adopt_them:
                 print_note(
                     f"Nothing is stored. To choose: esc venue adopt {venue} --found {job.id} --candidate CAMERA=N"
@@ -407,6 +409,7 @@ def adopt(
     job: AdoptedJob = None,
     found: AdoptedFinding = None,
     candidate: Candidates = None,
+    calibrate: CalibrateFound = False,
     as_json: AnswerAsJson = False,
     url: Url = DEFAULT_URL,
     api_key: ApiKey = None,
@@ -416,10 +419,10 @@ def adopt(
     Of a CAMERA: its refined pose and lens, which the last accepted calibration found; what that changes is in the job,
     `longer` and `differs_m` of the camera's `refined`. With --field: one of the numbers in `adoptable` of the job's
     result, which has the change as well. With --found: the cameras that `esc venue find` has found; a venue that is
-    not stored yet is created.
+    not stored yet is created, and --calibrate submits the frames of the search as its first calibration.
     """
     one_of_three = sum(one is not None for one in (camera, field, found)) == 1
-    if not one_of_three or (field is None) != (job is None) or (candidate and found is None):
+    if not one_of_three or (field is None) != (job is None) or ((candidate or calibrate) and found is None):
         raise typer.BadParameter("name a CAMERA, or a number of the field with --field and --job, or --found JOB")
     choice = parse_candidates(candidate or ())
     with open_client(url, api_key) as client:
@@ -429,6 +432,8 @@ def adopt(
             print_answer(client.adopt_field(venue, job, field), as_json=as_json)
         elif found is not None:
             print_answer(client.adopt_found(venue, found, choice), as_json=as_json)
+            if calibrate:
+                print_note(f"Job {client.calibrate_found(found).id} calibrates it with the frames of the search.")
 
 
 def _sought_site(

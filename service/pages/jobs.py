@@ -59,6 +59,7 @@ def job(job_id: JobIdPath, request: Request, context: InContext) -> Response:
     if found is None:
         kept = f"{context.settings.keep_jobs_days:g} days"
         raise Problem("job-not-found", f"It was deleted: by somebody, or since it ended more than {kept} ago.")
+    venue = context.venues.readable(found.venue) if found.venue else None
     return render_page(
         request,
         "job.html",
@@ -66,10 +67,12 @@ def job(job_id: JobIdPath, request: Request, context: InContext) -> Response:
         stages=STAGES,
         formats=get_args(FormatName),
         outcome=outcome_of(context, found, poses_in_use(context, found.venue)),
-        sizes=sizes_of(context.venues.readable(found.venue) if found.venue else None),
+        sizes=sizes_of(venue),
         adoptable=context.adopted_fields.adoptable(job_id),
         can_take=found.kind == "find" and context.found_venues.is_adoptable(job_id),
         is_stored=found.venue is not None and context.venues.exists(found.venue),
+        # A new venue has those cameras alone that the search had frames of.
+        has_every_frame=bool(found.frames) and (venue is None or venue.poses.keys() <= found.frames.keys()),
         can_be_repeated=can_be_resubmitted(context, found),
     )
 

@@ -450,6 +450,7 @@ def adopt_found(
     The job is one of `POST /venues/{id}/find`. Of each camera its first candidate is stored if that was accepted, or
     the one that `candidates` names, accepted or not. Only while the field and these cameras are as the job began with
     them. What the cameras remember of earlier nights ends. Nothing changes if they stand so already.
+    `POST /jobs/{id}/calibrate` then calibrates the venue with the frames of the job.
     """
 
     def allow(before: Venue | None) -> None:

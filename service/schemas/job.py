@@ -20,6 +20,11 @@ class Progress(Schema):
     fraction: float = Field(ge=0, le=1)
     generation: int | None = None
     loss: float | None = None
+    expected_end: datetime | None = Field(
+        None,
+        exclude_if=is_none,
+        description="Of a search for cameras: when it will end, estimated anew with each camera; else not there.",
+    )
 
 
 class JobError(Schema):

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 import unicodedata
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Literal, get_args
 
 ID_PATTERN = r"^[a-z0-9][a-z0-9_-]{0,63}$"
@@ -49,6 +51,9 @@ EventKind = Literal["poses.changed", "venue.*", "job.*", "alarm.*"]
 EVENT_KINDS: tuple[EventKind, ...] = get_args(EventKind)
 # Of jobs.
 JobKind = Literal["calibration", "intrinsics", "locate", "field", "find"]
+# Kinds of jobs that wait in a queue of their own, by its name. First poses take a second, and somebody waits for them;
+# searches take minutes, and no calibration is to wait for them.
+OWN_QUEUES: Mapping[JobKind, str] = MappingProxyType({"locate": "light", "find": "search"})
 JobStatus = Literal["queued", "running", "succeeded", "failed", "cancelled"]
 # Of calibrations.
 Verdict = Literal["accepted", "partly", "rejected"]

@@ -488,6 +488,11 @@ class FoundCameraResult(Schema):
     remarks: list[str] = Field(
         description="What was assumed, such as the side of a field that looks the same twice; doubts about its lens."
     )
+    assumed_side: Annotated[Literal["near", "far", "left", "right"], OPEN_WORD] | None = Field(
+        None,
+        description="The side that the first candidate stands on by an assumption about all cameras of the search. "
+        "Where it is wrong, take the second candidate of each of them, half a turn about the field's centre away.",
+    )
     image_size: list[int]
     candidates: list[CandidateResult]
 

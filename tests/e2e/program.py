@@ -9,6 +9,7 @@ import os
 import signal
 import sys
 import time
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 from service import child_process
@@ -70,6 +71,9 @@ def main() -> None:
         say(progress={"stage": "evolution", "fraction": 0.5, "generation": 7, "loss": 0.3})
     match behaviour:
         case "hang":
+            if task["kind"] == "find":
+                end = datetime.now(UTC) + timedelta(seconds=150)
+                say(progress={"stage": "evolution", "fraction": 0.5, "expected_end": end.isoformat()})
             time.sleep(3600)
         case "crash":
             os.kill(os.getpid(), signal.SIGSEGV)
@@ -149,8 +153,12 @@ def sought_cameras(task: dict, with_frames: list[str]) -> list[str]:
 
 
 def found_cameras(sought: list[str], behaviour: str, task: dict) -> dict:
-    """Two candidates of each camera, 40 and 60 m from the pitch; none or the first camera alone is accepted by name."""
-    good = {"reject": 0, "partly": 1}.get(behaviour, len(sought))
+    """Two candidates of each camera, 40 and 60 m from the pitch; none or the first camera alone is accepted by name.
+
+    The second one of an accepted camera is said to be its twin; of "hopeless" ones there are 13 candidates.
+    """
+    good = {"reject": 0, "hopeless": 0, "partly": 1}.get(behaviour, len(sought))
+    away_m = [40.0 + 20 * number for number in range(13 if behaviour == "hopeless" else 2)]
     why = "two poses explain the frame alike"
     return {
         "accepted": good == len(sought),
@@ -161,9 +169,10 @@ def found_cameras(sought: list[str], behaviour: str, task: dict) -> dict:
                 "accepted": number < good,
                 "reason": None if number < good else "not-unique",
                 "rejected_because": None if number < good else why,
-                "remarks": ["taken: it stands on the near side"],
+                "remarks": ["assumed: it stands on the near side"],
+                "assumed_side": "near" if number < good else None,
                 "image_size": [64, 48],
-                "candidates": [candidate(away) for away in (40.0, 60.0)],
+                "candidates": [candidate(away) for away in away_m],
             }
             for number, camera in enumerate(sought)
         ],
@@ -182,7 +191,7 @@ def candidate(away_m: float) -> dict:
         "agreement": 0.8,
         "lines_found": 0.9,
         "residual_px": 1.0,
-        "sigma": None,
+        "sigma": {"rotation_deg": 0.35, "position_m": 0.17},
     }
 
 

@@ -7,8 +7,8 @@ from playwright.sync_api import expect
 
 from service.schemas.names import id_like
 from service.store.jobs.queries import ONE
-from tests.e2e.routes.test_find import depth, find, found, site
-from tests.e2e.running import png
+from tests.e2e.routes.test_find import depth, find, forget_frames, found, site
+from tests.e2e.running import png, upload
 from tests.pages import browsing
 
 
@@ -42,9 +42,25 @@ def test_a_venue_is_made_of_frames_by_three_clicks(stub, visit, files, name):
     with stub.database() as connection:
         sought = stored_site(connection, page.url.rpartition("/")[2])
     assert sought["cameras"] == [{"id": "left", "side": "near"}, {"id": "right", "field_of_view_deg": 65}]
+    search = page.url
     page.get_by_role("button", name="Create the venue").click()
-    page.wait_for_url(f"**/ui/venues/{name}")
+    expect(page.get_by_role("heading", name=f"Calibration of {name}")).to_be_visible()
+    expect(page.get_by_role("heading", name="Stitched view")).to_be_visible()
+    assert stub.job(page.url.rpartition("/")[2])["frames"].keys() == {"left", "right"}
+    page.goto(f"/ui/venues/{name}")
     expect(page.get_by_text("found from frames")).to_be_visible()
+    page.goto(search)
+    expect(page.get_by_text("Taken, as revision 1 of")).to_be_visible()
+
+
+def test_where_no_calibration_can_follow_the_page_says_so(stub, visit, name):
+    job = found(stub, name, place=site(name))
+    page = visit(stub.url, f"/ui/jobs/{job['id']}", forgiven=("410",))
+    forget_frames(stub, job)
+    page.get_by_role("button", name="Create the venue").click()
+    expect(page.locator("#refused")).to_contain_text("The poses are stored, but not calibrated yet. Frames are deleted")
+    page.get_by_role("link", name="To the venue").click()
+    page.wait_for_url(f"**/ui/venues/{name}")
     assert [depth(stub.http.get(f"/venues/{name}").json(), camera) for camera in ("left", "right")] == [40, 40]
 
 
@@ -84,11 +100,46 @@ def test_where_several_poses_explain_a_frame_a_person_chooses_by_a_click(stub, v
     expect(page.get_by_text("Two poses explain the frame alike")).to_be_visible()
     page.locator("[data-camera=right]").get_by_label("Candidate 2").check()
     button.click()
-    page.wait_for_url(f"**/ui/venues/{name}")
-    assert [depth(stub.http.get(f"/venues/{name}").json(), camera) for camera in ("left", "right")] == [40, 60]
+    expect(page.get_by_role("heading", name=f"Calibration of {name}")).to_be_visible()
+    stub.end(page.url.rpartition("/")[2])
+    # The stub of a calibration moves the one that it accepts an eighth of the way nearer.
+    assert [depth(stub.http.get(f"/venues/{name}").json(), camera) for camera in ("left", "right")] == [35, 60]
     page.goto(f"/ui/jobs/{job['id']}")
     expect(page.get_by_text("Taken, as revision 1 of")).to_be_visible()
     expect(button).to_have_count(0)
+
+
+def test_what_was_found_is_said_not_to_be_saved_and_how_well_it_is_known(stub, visit, name):
+    page = visit(stub.url, f"/ui/jobs/{found(stub, name, place=site(name))['id']}")
+    expect(page.get_by_text("Found, not saved yet")).to_be_visible()
+    expect(page.get_by_text("Accepted")).to_have_count(0)
+    expect(page.get_by_text("± 17.0 cm, 0.350°").first).to_be_visible()
+    expect(page.get_by_text("Agreement")).to_have_count(0)
+
+
+def test_cameras_whose_side_is_assumed_are_swapped_by_a_click(stub, visit, name):
+    page = visit(stub.url, f"/ui/jobs/{found(stub, name, place=site(name))['id']}")
+    swap = page.get_by_role("button", name="Swap: it stands on the far side")
+    for position in ("0.0, -60.0, 8.0 m", "0.0, -40.0, 8.0 m", "0.0, -60.0, 8.0 m"):
+        swap.click()
+        expect(page.get_by_text(position).locator("visible=true")).to_have_count(2)
+    page.get_by_role("button", name="Create the venue").click()
+    expect(page.get_by_role("heading", name=f"Calibration of {name}")).to_be_visible()
+    stub.end(page.url.rpartition("/")[2])
+    # The stub of a calibration moves each camera an eighth of the way nearer.
+    assert [depth(stub.http.get(f"/venues/{name}").json(), camera) for camera in ("left", "right")] == [52.5, 52.5]
+
+
+def test_a_search_that_failed_shows_three_candidates_and_what_may_help(stub, visit, name):
+    page = visit(
+        stub.url,
+        f"/ui/jobs/{found(stub, name, files=upload(cameras=('left',)), place=site(name, 'hopeless', ['left']))['id']}",
+    )
+    expect(page.get_by_text("Not all found")).to_be_visible()
+    expect(page.get_by_text("What may help: to choose the candidate")).to_be_visible()
+    expect(page.locator(".candidate:visible")).to_have_count(3)
+    page.get_by_text("What else was considered (10)").click()
+    expect(page.locator(".candidate:visible")).to_have_count(13)
 
 
 def test_what_cannot_be_taken_any_more_says_so(stub, visit, name):
@@ -117,6 +168,13 @@ def test_a_camera_of_a_venue_is_found_again_and_its_neighbour_stays(stub, visit,
     page.get_by_role("button", name="Store these poses").click()
     page.wait_for_url(f"**/ui/venues/{name}")
     assert [depth(stub.http.get(f"/venues/{name}").json(), camera) for camera in ("left", "right")] == [40, 50]
+
+
+def test_a_search_says_how_long_it_will_still_take(stub, visit, name):
+    job = find(stub, name, place=site(name, "hang")).json()
+    page = visit(stub.url, f"/ui/jobs/{job['id']}")
+    expect(page.get_by_text("search, about 3 min left")).to_be_visible()
+    stub.http.post(f"/jobs/{job['id']}/cancel")
 
 
 def test_a_search_is_followed_to_its_end(stub, visit, name):

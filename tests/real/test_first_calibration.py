@@ -87,7 +87,7 @@ def test_from_frames_and_the_sport_alone_both_cameras_are_found(real_pair, tmp_p
         shutil.copy(path, tmp_path / f"{name}_000.jpg")
     find, *_ = commands()
     said = typed(find, tmp_path).stderr
-    assert "taken: camera left stands on the near side" in said
+    assert "assumed: it stands on the near side" in said
     assert "The field is not flat" in said
     venue = json.loads((tmp_path / "found.json").read_text())
     assert venue["field"]["ridge"][0][2] == pytest.approx(0.237, abs=0.05)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -20,7 +21,7 @@ from worker.calibration.records import Calibration, Options, Progress, ProgressR
 from worker.calibration.refinement.refine import Observations
 from worker.calibration.relocalisation.candidate import Candidate
 from worker.calibration.relocalisation.crown import find_crown
-from worker.calibration.relocalisation.field_halves import choose_sides
+from worker.calibration.relocalisation.field_halves import choose_sides, side_of
 from worker.calibration.relocalisation.field_map import FieldMap
 from worker.calibration.relocalisation.relocalise import NotFound, Relocalisation, relocalise, twin
 from worker.calibration.relocalisation.rivals import tell_rivals_apart
@@ -32,8 +33,11 @@ OF_ONE_KIND = 0.03
 FITS_BETTER = 0.9
 """Of the residual that the gate allows, through a lens that was found with the pose: it bends to meet a field whose
 measures are wrong by decimetres, and what is left over is smaller for that."""
-SEGMENTED, SEARCHED = 0.2, 0.85
-"""Share of the whole at which the frames are segmented, and the cameras found; to calibrate them is the rest."""
+SEGMENTED, SEARCHED = 0.05, 0.95
+"""Share of the whole at which the frames are segmented, and the cameras found; to calibrate them is the rest. Of two
+cameras of which nothing was known (66 core-seconds) they were 0.02 and 0.95."""
+USUAL_CORE_S, USUAL_CORE_S_KNOWN_LENS = 35.0, 5.0
+"""Core-seconds that the search of a camera takes: 25 to 40 where nothing is known of it, 4 with its lens (median)."""
 
 
 @dataclass(frozen=True)
@@ -42,13 +46,15 @@ class FoundCamera:
 
     `candidates`: cameras that may have taken its frame, the best first, for a person to choose from; a best one that is
     accepted is at the pose of a calibration that began with it. `refusal`: why the best one is not taken, None where it
-    is; `remarks`: what was assumed.
+    is; `remarks`: what was assumed. `assumed_side`: the side of a symmetric field that the best one stands on by an
+    assumption about all cameras of the search; the second one then is its twin on the other side. None: not assumed.
     """
 
     id: str
     candidates: Sequence[Candidate]
     refusal: NotFound | None
     remarks: Sequence[str]
+    assumed_side: str | None = None
 
     @property
     def accepted(self) -> bool:
@@ -102,10 +108,12 @@ def find_cameras(
     # Find each camera alone; who was found helps who was not. Then choose the halves of the field that they look at,
     # and of several poses the one from which the ground looks as another camera sees it.
     with progress.timed("evolution"):
+        pace = _Pace(progress.timings)
         seen = {one.id: _seen(one, frames[one.id], responses[one.id]) for one in sought}
         alone = dict[str, Relocalisation]()
         for number, one in enumerate(sought):
-            progress.at_fraction("evolution", SEGMENTED + (SEARCHED - SEGMENTED) * number / len(sought))
+            fraction = SEGMENTED + (SEARCHED - SEGMENTED) * number / len(sought)
+            progress.at_fraction("evolution", fraction, remaining_s=pace.remaining_s(number, sought[number:]))
             alone[one.id] = relocalise(pitch, markings, one, *seen[one.id], seed)
         for helped in _with_lenses_of_others(sought, alone):
             progress.at_fraction("evolution", SEARCHED)
@@ -132,12 +140,34 @@ def find_cameras(
             calibrated = calibrate(
                 pitch, [*found, *beside], frames, remembered, Options(seed=seed, recover="never"), stop=stop
             )
+    judged = [_judged(camera, placed[camera.id], calibrated) for camera in sought]
+    is_side_assumed = markings.is_symmetric and not known and all(by_id[one.id].place.is_anywhere for one in found)
     return FoundCameras(
         pitch,
-        [_judged(camera, placed[camera.id], calibrated) for camera in sought],
+        [_with_twin(camera) if is_side_assumed and camera.accepted else camera for camera in judged],
         None if calibrated is None else calibrated.stitch_error_px,
         progress.timings,
     )
+
+
+class _Pace:
+    """The pace of a search: by the cameras that have been searched for, before the first of them by the core's share.
+
+    `segmented`: the time that segmentation took, of the clock and of cores, which says how much of a core is to be had.
+    """
+
+    def __init__(self, segmented: StageTimings) -> None:
+        seconds, core_seconds = segmented.seconds["segmentation"], segmented.core_seconds["segmentation"]
+        # The search of a camera runs on one core.
+        self._share = min(1.0, core_seconds / max(seconds, 1e-9)) or 1.0
+        self._begun = time.monotonic()
+
+    def remaining_s(self, done: int, waiting: Sequence[SoughtCamera]) -> float:
+        """Return how long the cameras that wait will still take."""
+        if done:
+            return (time.monotonic() - self._begun) / done * len(waiting)
+        usual = (USUAL_CORE_S if one.is_lens_sought else USUAL_CORE_S_KNOWN_LENS for one in waiting)
+        return sum(usual) / self._share
 
 
 class _Remembered:
@@ -235,6 +265,13 @@ def _judged(sought: SoughtCamera, found: Relocalisation, calibrated: Calibration
         return FoundCamera(sought.id, found.candidates, NotFound("not-confirmed", words), found.remarks)
     best, *others = found.candidates
     return FoundCamera(sought.id, [replace(best, camera=result.camera), *others], None, found.remarks)
+
+
+def _with_twin(found: FoundCamera) -> FoundCamera:
+    """The same with the twin of its best candidate behind it: all cameras of the search may stand half a turn away."""
+    best, *others = found.candidates
+    both = [best, replace(best, camera=twin(best.camera))]
+    return replace(found, candidates=[*both, *others], assumed_side=side_of(best.camera))
 
 
 def why_not_confirmed(result: CameraResult, *, is_lens_found: bool) -> str | None:

@@ -67,12 +67,16 @@ class Options:
 
 @dataclass(frozen=True)
 class Progress:
-    """Progress of a calibration: `fraction` 0..1 of the whole job; `generation` and `loss` during the evolution."""
+    """Progress of a calibration: `fraction` 0..1 of the whole job; `generation` and `loss` during the evolution.
+
+    `remaining_s`: an estimate, None where there is nothing to go by.
+    """
 
     stage: Stage
     fraction: float
     generation: int | None = None
     loss: float | None = None
+    remaining_s: float | None = None
 
 
 class StageTimings:
@@ -216,14 +220,19 @@ class ProgressReporter:
         self.at_fraction(stage, begin + share * (end - begin), generation, loss)
 
     def at_fraction(
-        self, stage: Stage, fraction: float, generation: int | None = None, loss: float | None = None
+        self,
+        stage: Stage,
+        fraction: float,
+        generation: int | None = None,
+        loss: float | None = None,
+        remaining_s: float | None = None,
     ) -> None:
         """Report a `fraction` 0..1 of the whole, where stages have other shares; raise `Stopped` when asked to stop."""
         if self.stop():
             raise Stopped
         # A second search does not take back what has been reported.
         self.fraction = max(self.fraction, fraction)
-        self.report(Progress(stage, self.fraction, generation, loss))
+        self.report(Progress(stage, self.fraction, generation, loss, remaining_s))
 
     def evolution(self, total: int) -> Callable[[int, float], None]:
         """Return the callback that a search of at most `total` generations calls after each one."""

@@ -236,6 +236,7 @@ class Progress(TypedDict):
     fraction: float
     generation: NotRequired[int | None]
     loss: NotRequired[float | None]
+    expected_end: NotRequired[str | None]
 
 
 class JobError(TypedDict):

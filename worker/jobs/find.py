@@ -134,7 +134,8 @@ def _pictures(given: Field, found: Field, camera: FoundCamera, frame: Picture) -
     for number, one in enumerate(camera.candidates, start=1):
         name = candidate_picture_name(camera.id, number)
         try:
-            pitch = found if camera.was_calibrated and number == 1 else given
+            first = 1 if camera.assumed_side is None else 2
+            pitch = found if camera.was_calibrated and number <= first else given
             pictures[name] = encode_jpeg(candidate_picture(pitch, one.camera, frame, f"candidate {number}"))
         except Exception:  # what is no camera of this frame may look anywhere; a picture is not worth losing the others
             log.warning("cannot draw %s", name, exc_info=True)
@@ -175,6 +176,7 @@ def _camera(found: FoundCamera, size: tuple[int, int], remarks: Sequence[str]) -
         reason=None if found.refusal is None else found.refusal.reason,
         rejected_because=None if found.refusal is None else found.refusal.words,
         remarks=[*remarks, *found.remarks],
+        assumed_side=found.assumed_side,
         image_size=list(size),
         candidates=[_candidate(one) for one in found.candidates],
     )

@@ -36,6 +36,8 @@ if TYPE_CHECKING:
 
 BEHIND_THE_OTHERS = 10
 """Niceness: answers of the API and heartbeats of the worker on the same machine go before the computation."""
+BEHIND_CALIBRATIONS = 9
+"""So much more of it for a search, which runs beside calibrations and leaves them nearly all of a core: nine tenths."""
 
 
 def main() -> None:
@@ -45,6 +47,8 @@ def main() -> None:
     parent = Parent()
     logging.basicConfig(handlers=[parent], format="%(message)s")
     request, files = read_request(sys.stdin.buffer)
+    if request["task"]["kind"] == "find":
+        os.nice(BEHIND_CALIBRATIONS)
     means = ComputeResources(**request["means"] | {"model": Path(request["means"]["model"])})
     try:
         solution = _compute(request["task"], files, means, lambda progress: parent.told({"progress": progress}))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from datetime import UTC, datetime, timedelta
 from math import isfinite, isnan
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
@@ -138,12 +139,15 @@ def engine_failures() -> Iterator[None]:
 
 def progress_to_schema(step: records.Progress) -> Progress:
     """How far the engine is, with room for the pictures."""
-    return Progress(
+    progress = Progress(
         stage=step.stage,
         fraction=min(max(step.fraction, 0.0), PREVIEW_FRACTION),
         generation=step.generation,
         loss=finite_or_none(step.loss),
     )
+    if step.remaining_s is not None:
+        progress["expected_end"] = (datetime.now(UTC) + timedelta(seconds=step.remaining_s)).isoformat()
+    return progress
 
 
 def camera_to_schema(

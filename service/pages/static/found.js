@@ -21,23 +21,49 @@ function tell() {
   form.querySelector("[data-open]").textContent = words;
 }
 
+/** Let the cameras stand half a turn about the field's centre away, as their second candidates do, or back again. */
+function swap(event) {
+  const wasSwapped = event.currentTarget.getAttribute("aria-pressed") === "true";
+  event.currentTarget.setAttribute("aria-pressed", !wasSwapped);
+  for (const section of form.querySelectorAll("[data-assumed]")) {
+    const radios = [1, 2].map((number) => section.querySelector(`input[value="${number}"]`));
+    const [from, to] = wasSwapped ? radios.reverse() : radios;
+    if (from.checked) to.checked = true;
+    from.closest("li").hidden = true;
+    to.closest("li").hidden = false;
+  }
+  tell();
+}
+
 async function take(event) {
   event.preventDefault();
   const refused = document.getElementById("refused");
   button.disabled = refused.hidden = true;
+  const venue = `${root}/ui/venues/${form.dataset.venue}`;
   const candidates = Object.fromEntries(cameras.map((camera) => [camera, chosen(camera)]));
   try {
     await call("POST", `${root}/venues/${form.dataset.venue}/adopt-found`, {job: form.dataset.job, candidates});
-    location.assign(`${root}/ui/venues/${form.dataset.venue}`);
   } catch (problem) {
     refused.textContent = problem.message;
     refused.hidden = false;
-    tell();
+    return tell();
+  }
+  if (!("calibrates" in form.dataset)) return location.assign(venue);
+  try {
+    const job = await call("POST", `${root}/jobs/${form.dataset.job}/calibrate`);
+    return location.assign(`${root}/ui/jobs/${job.id}`);
+  } catch (problem) {
+    const link = document.createElement("a");
+    link.href = venue;
+    link.textContent = "To the venue";
+    refused.replaceChildren(`The poses are stored, but not calibrated yet. ${problem.message} `, link);
+    refused.hidden = false;
   }
 }
 
 if (button) {
   form.addEventListener("input", tell);
   form.addEventListener("submit", take);
+  form.querySelector("[data-swap]")?.addEventListener("click", swap);
   tell();
 }

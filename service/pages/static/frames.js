@@ -1,10 +1,50 @@
 // Frames that somebody chose: shown small, and looked at before they travel.
 
 const THUMB = 320;
+const JPEG = {start: 0xffd8, exif: 0xe1, name: 0x45786966, scan: 0xda, padding: 0xff};
+const PNG = {signature: 8, exif: 0x65584966, around: 12};
 
-/** Width and height of a picture as it is stored, however its camera was held. */
+/** Draw a picture as its pixels are stored, however its camera was held: the service takes them so as well.
+ *
+ * Exif says how that was, and is left out of what is decoded: browsers differ in `imageOrientation: "none"`, which
+ * Chromium takes for "from-image" since 2025.
+ */
+export async function pictureOf(file, options) {
+  const bytes = await file.arrayBuffer();
+  const view = new DataView(bytes);
+  const isJpeg = bytes.byteLength > 1 && view.getUint16(0) === JPEG.start;
+  const kept = [];
+  let from = 0;
+  for (const [begin, end] of isJpeg ? exifOfJpeg(view) : exifOfPng(view)) {
+    kept.push(bytes.slice(from, begin));
+    from = end;
+  }
+  return createImageBitmap(new Blob([...kept, bytes.slice(from)], {type: file.type}), options);
+}
+
+/** Where Exif stands among the segments before the picture itself; each begins with a marker and its length. */
+function* exifOfJpeg(view) {
+  for (let at = 2; at + 8 <= view.byteLength && view.getUint8(at) === 0xff;) {
+    const marker = view.getUint8(at + 1);
+    if (marker === JPEG.scan) return;
+    const end = marker === JPEG.padding ? at + 1 : at + 2 + view.getUint16(at + 2);
+    if (marker === JPEG.exif && view.getUint32(at + 4) === JPEG.name) yield [at, end];
+    at = end;
+  }
+}
+
+/** Where Exif stands among the chunks, each with its length and its type before and a checksum behind. */
+function* exifOfPng(view) {
+  for (let at = PNG.signature; at + PNG.around <= view.byteLength;) {
+    const end = at + PNG.around + view.getUint32(at);
+    if (view.getUint32(at + 4) === PNG.exif) yield [at, end];
+    at = end;
+  }
+}
+
+/** Width and height of a picture as it is stored. */
 export async function sizeOf(file) {
-  const picture = await createImageBitmap(file, {imageOrientation: "none"});
+  const picture = await pictureOf(file);
   const size = [picture.width, picture.height];
   picture.close();
   return size;
@@ -12,7 +52,7 @@ export async function sizeOf(file) {
 
 /** A small picture of a file. */
 export async function thumbnail(file) {
-  const picture = await createImageBitmap(file, {imageOrientation: "none", resizeWidth: THUMB, resizeQuality: "medium"});
+  const picture = await pictureOf(file, {resizeWidth: THUMB, resizeQuality: "medium"});
   const canvas = document.createElement("canvas");
   canvas.width = picture.width;
   canvas.height = picture.height;

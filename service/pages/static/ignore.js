@@ -1,5 +1,6 @@
 // Areas of each camera's frame that are to be ignored: drawn corner by corner, saved as a part of the venue.
 
+import {pictureOf} from "./frames.js";
 import {call, root} from "./page.js";
 
 const SVG = "http://www.w3.org/2000/svg";
@@ -41,7 +42,7 @@ class Areas {
   async show(file) {
     if (!file) return;
     try {
-      const picture = await createImageBitmap(file, {imageOrientation: "none"});
+      const picture = await pictureOf(file);
       const alike = Math.abs(picture.width / picture.height - this.size[0] / this.size[1]) < 0.01;
       this.say(alike ? "" : `This picture has ${picture.width} × ${picture.height} pixels, the frames of this camera are of another shape.`);
       this.canvas.getContext("2d").drawImage(picture, 0, 0, this.canvas.width, this.canvas.height);

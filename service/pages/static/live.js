@@ -35,7 +35,9 @@ class Live {
     const {progress} = job;
     showStatus(job);
     const place = job.queue_position ? `, place ${job.queue_position}` : "";
-    const said = progress ? progress.stage : LEGENDS[job.status] + place;
+    // See the macro of this name in parts.html.
+    const stage = job.kind === "find" && progress?.stage === "evolution" ? "search" : progress?.stage;
+    const said = progress ? stage + remaining(progress) : LEGENDS[job.status] + place;
     if (this.part("stage").textContent !== said) this.part("stage").textContent = said;
     if (!progress) return;
     this.box.querySelector("progress").value = progress.fraction;
@@ -72,6 +74,13 @@ class Live {
     this.losses.push(loss);
     this.plot.setData([this.generations, this.losses]);
   }
+}
+
+/** How long it will still take, where there is an estimate. */
+function remaining({expected_end: end}) {
+  if (!end) return "";
+  const minutes = Math.ceil((new Date(end) - Date.now()) / 60_000);
+  return minutes > 0 ? `, about ${minutes} min left` : ", takes longer than expected";
 }
 
 /** Every badge of a job says the same. */

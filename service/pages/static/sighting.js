@@ -1,5 +1,7 @@
 // A frame in which points are clicked, and the shapes that are drawn over it.
 
+import {pictureOf} from "./frames.js";
+
 const SVG = "http://www.w3.org/2000/svg";
 const LOUPE = {side: 200, reach: 25};
 
@@ -28,7 +30,7 @@ export class Sighting {
   }
 
   async show(file, [width, height]) {
-    this.bitmap = await createImageBitmap(file, {imageOrientation: "none"});
+    this.bitmap = await pictureOf(file);
     this.canvas.width = Math.min(width, 1920);
     this.canvas.height = Math.round((height * this.canvas.width) / width);
     this.canvas.getContext("2d").drawImage(this.bitmap, 0, 0, this.canvas.width, this.canvas.height);

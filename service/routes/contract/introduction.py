@@ -14,7 +14,7 @@ from world to camera, `position` the camera's centre in the world, `translation`
 **Order of steps:**
 
 1. `POST /venues/{venue_id}/find`: a frame per camera and the name of the sport. The job finds lenses and first poses;
-   `POST /venues/{venue_id}/adopt-found` makes them a venue.
+   `POST /venues/{venue_id}/adopt-found` makes them a venue, `POST /jobs/{job_id}/calibrate` calibrates that at once.
 2. Or by hand: `POST /intrinsics` finds the lens of each camera from photos of a board, `PUT /venues/{venue_id}` has the
    field and the cameras with first poses, and `POST /venues/{venue_id}/cameras/{camera}/locate` finds one from clicks.
 3. `POST /venues/{venue_id}/calibrate`: a frame per camera. The answer is a job; `GET /jobs/{job_id}?wait=60` waits

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+
 from fastapi import APIRouter, Request, Response
 
 from service.api.context import Context, InContext
@@ -11,12 +13,13 @@ from service.routes.contract.missing import no_such_venue
 from service.routes.jobs import ExistingJob
 from service.routes.submissions import forms, job_submission
 from service.schemas.job import Job
+from service.schemas.options import Options
 from service.schemas.problems import Problem
 from service.schemas.venue import Venue
 from service.store.ids import new_id
 from service.store.jobs.files import frame_folder
 from service.store.jobs.submission import Submission
-from service.store.jobs.task import Origin, UnreadableJob
+from service.store.jobs.task import Origin, UnreadableJob, seeded
 
 router = APIRouter(prefix="/jobs", tags=["jobs"], route_class=Guarded)
 
@@ -33,38 +36,85 @@ def submit_again(job: ExistingJob, request: Request, context: InContext) -> Resp
     return submit(context, job, request.state.origin)
 
 
+@router.post(
+    "/{job_id}/calibrate",
+    status_code=202,
+    response_model=Job,
+    openapi_extra=needs_scope("calibrate"),
+    responses=submission_responses("It is being computed") | problem_responses(404, 409, 410, 422, 507),
+)
+def calibrate_found(job: ExistingJob, request: Request, context: InContext) -> Response:
+    """Calibrate a venue with the frames of a search for its cameras, once what was found is stored.
+
+    `POST /venues/{id}/adopt-found` stores it. The calibration has the default options and begins with the poses that
+    hold now; frames of cameras that were left out are not used. Only as long as the frames of the search are kept.
+    """
+    if job.kind != "find":
+        detail = f"It is no search for cameras but of the kind {job.kind}: POST /jobs/{job.id}/again takes its frames."
+        raise Problem("poses-not-found", detail, job=job.id)
+    forms.require_disk_space(context)
+    venue = context.venues.get(job.venue or "")
+    if venue is None:
+        raise no_such_venue(job.venue or "")
+    search = _kept(context, job)
+    missing = [camera for camera in venue.poses if camera not in search.frames]
+    if missing:
+        raise Problem(
+            "missing-camera",
+            f"The search had no frame of {', '.join(missing)}: POST /venues/{venue.id}/calibrate with a frame of each.",
+            expected=list(venue.poses),
+            got=list(search.frames),
+        )
+    of_search = {
+        "kind": "calibration",
+        "venue": venue,
+        "site": None,
+        "options": seeded(Options()),
+        "frames": {camera: search.frames[camera] for camera in venue.poses},
+        # Asked for twice while it is open, it is one calibration.
+        "content_hash": hashlib.sha256(f"calibration of {job.id}".encode()).hexdigest(),
+    }
+    return _submit_copy(context, job, search.model_copy(update=of_search), request.state.origin)
+
+
 def submit(context: Context, job: Job, origin: Origin) -> Response:
     """Make a job's frames, which the store copies, a new job."""
     still = context.jobs.get(job.id)
     if still is not None and still.open:
         return job_submission.submission_response(still, new=False)
     forms.require_disk_space(context)
-    try:
-        before = context.submissions.of(job.id)
-    except UnreadableJob as error:
-        raise Problem("job-of-newer-version", f"This version cannot read what was asked: {error}", job=job.id) from None
-    if before is None:
-        raise _gone(context, job)
+    before = _kept(context, job)
     if before.venue is not None:
         _require_the_same(context, before.venue)
-    renewed = _renewed(before, origin)
+    return _submit_copy(context, job, before.model_copy(update={"content_hash": before.hash_again}), origin)
+
+
+def _kept(context: Context, job: Job) -> Submission:
+    """Return what a job was made of; raise a `Problem` where this version cannot read it or its frames are gone."""
+    try:
+        kept = context.submissions.of(job.id)
+    except UnreadableJob as error:
+        raise Problem("job-of-newer-version", f"This version cannot read what was asked: {error}", job=job.id) from None
+    if kept is None:
+        raise _gone(context, job)
+    return kept
+
+
+def _submit_copy(context: Context, job: Job, wanted: Submission, origin: Origin) -> Response:
+    """Submit what is wanted as a new job, whose frames are copies of those of `job`."""
+    job_id = new_id()
+    old, new = frame_folder(job.id), frame_folder(job_id)
+    copies = {name: [new + path.removeprefix(old) for path in paths] for name, paths in wanted.frames.items()}
+    changes = {"job_id": job_id, "frames": copies, "origin": origin, "idempotency_key": None}
 
     def store() -> None:
-        for name, paths in before.frames.items():
-            for old, new in zip(paths, renewed.frames[name], strict=True):
-                if not context.blobs.copy(old, new):
+        for name, paths in wanted.frames.items():
+            for path, copy in zip(paths, copies[name], strict=True):
+                if not context.blobs.copy(path, copy):
                     raise _gone(context, job)
 
-    return job_submission.submission_response(*job_submission.enqueue(context, renewed, store))
-
-
-def _renewed(before: Submission, origin: Origin) -> Submission:
-    job_id = new_id()
-    old, new = frame_folder(before.job_id), frame_folder(job_id)
-    frames = {name: [new + path.removeprefix(old) for path in paths] for name, paths in before.frames.items()}
-    content = {"content_hash": before.hash_again, "idempotency_key": None}
-    renewed = {"job_id": job_id, "frames": frames, "origin": origin, **content}
-    return before.model_copy(update=renewed)
+    submission = wanted.model_copy(update=changes)
+    return job_submission.submission_response(*job_submission.enqueue(context, submission, store))
 
 
 def _require_the_same(context: Context, then: Venue) -> None:

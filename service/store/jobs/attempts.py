@@ -205,7 +205,7 @@ def _holders(connection: sa.Connection, tasks: Collection[Task]) -> set[str]:
 
 def _progress_columns(progress: Mapping[str, Progress]) -> dict[str, sa.ColumnElement[Any]]:
     """The columns of jobs in one statement, of which some are further than they were; the others stay as they are."""
-    shown = {token: sa.literal(far.model_dump(), j.progress.type) for token, far in progress.items()}
+    shown = {token: sa.literal(far.model_dump(mode="json"), j.progress.type) for token, far in progress.items()}
     return {
         "progress": sa.case(shown, value=j.run_token, else_=j.progress),
         "revision": j.revision + sa.case((j.run_token.in_(progress), 1), else_=0),

@@ -13,7 +13,7 @@ import sqlalchemy as sa
 from service.schemas.base import TOLERANTLY, Unreadable
 from service.schemas.find import SoughtSite
 from service.schemas.job import CallbackState, Job, JobSummary
-from service.schemas.names import JobKind, JobStatus
+from service.schemas.names import OWN_QUEUES, JobKind, JobStatus
 from service.schemas.options import FindOptions
 from service.schemas.results import NO_CHOICE, FindResult, Result
 from service.schemas.venue import Venue
@@ -31,8 +31,8 @@ j = tables.jobs.c
 BRING_POSES: tuple[JobKind, ...] = ("calibration", "find")
 # What pollers ask for, hundreds of times a second: to put the statement together takes longer than to run it.
 ONE = sa.select(tables.jobs).where(j.id == sa.bindparam("job_id"))
-# First poses have a queue of their own.
-PLACE = sa.func.row_number().over(partition_by=j.kind == "locate", order_by=(j.priority, j.id))
+LANE = sa.case((j.kind.in_(list(OWN_QUEUES)), j.kind), else_="")
+PLACE = sa.func.row_number().over(partition_by=LANE, order_by=(j.priority, j.id))
 QUEUE = sa.select(j.id, PLACE.label("position")).where(j.status == "queued").subquery()
 
 

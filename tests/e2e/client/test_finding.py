@@ -53,7 +53,7 @@ def test_cameras_of_known_lenses_are_found_and_the_venue_is_written(answered):
         assert np.linalg.norm(np.array(camera["pose"]["position"]) - truth.pose.position) < 0.15
     assert json.loads(out)["accepted"]
     assert "Camera left: (-0." in err
-    assert "taken: camera left stands on the near side" in err
+    assert "assumed: it stands on the near side" in err
 
 
 def test_what_was_found_calibrates(answered, tmp_path):
@@ -142,9 +142,10 @@ def test_a_candidate_is_chosen_by_its_number(service, esc, name, tmp_path):
     open_one = esc("venue", "adopt", name, "--found", job)
     assert open_one.returncode == 1
     assert "Choose one of the candidates of right" in open_one.stderr
-    assert esc("venue", "adopt", name, "--found", job, "--candidate", "right=2").returncode == 0
-    cameras = service.http.get(f"/venues/{name}").json()["cameras"]
-    assert [camera["pose"]["position"][1] for camera in cameras] == [-40, -60]
+    taken = esc("venue", "adopt", name, "--found", job, "--candidate", "right=2", "--calibrate")
+    assert taken.returncode == 0
+    assert "calibrates it with the frames of the search" in taken.stderr
+    assert [camera["pose"]["position"][1] for camera in json.loads(taken.stdout)["cameras"]] == [-40, -60]
 
 
 def test_without_wait_a_search_is_told_and_waited_for_by_its_job(service, esc, name):

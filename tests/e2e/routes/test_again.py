@@ -1,10 +1,6 @@
 """A job's frames once more."""
 
-from datetime import UTC, datetime
-
-import sqlalchemy as sa
-
-from service.store import tables
+from tests.e2e.routes.test_find import forget_frames
 from tests.e2e.running import venue
 
 
@@ -27,11 +23,9 @@ def test_who_asks_twice_gets_one_job(service, name):
 
 
 def test_frames_that_are_gone_are_asked_for_again(service, name):
-    job = service.calibrated(service.venue(name))["id"]
-    with service.database() as connection:
-        gone = sa.update(tables.jobs).where(tables.jobs.c.id == job).values(frames_deleted_at=datetime.now(UTC))
-        connection.execute(gone)
-    answer = service.http.post(f"/jobs/{job}/again")
+    job = service.calibrated(service.venue(name))
+    forget_frames(service, job)
+    answer = service.http.post(f"/jobs/{job['id']}/again")
     assert (answer.status_code, answer.json()["type"]) == (410, "/problems/frames-deleted")
 
 

@@ -1,9 +1,12 @@
 """Finding cameras by HTTP: of a venue that is not stored yet and of one that is, and taking what was found."""
 
 import json
+from datetime import UTC, datetime
 
 import pytest
+import sqlalchemy as sa
 
+from service.store import tables
 from tests.e2e.running import png, upload, venue
 from tests.homes import in_both_homes
 
@@ -104,6 +107,54 @@ def test_of_a_stored_venue_those_with_frames_are_found_and_the_others_stay(servi
     back = service.http.post(f"/venues/{name}/restore", json={"revision": 1}).json()
     assert [depth(back, camera) for camera in ("left", "right")] == [50, 50]
     assert back["cameras"] == before["cameras"]
+
+
+@in_both_homes
+def test_what_was_found_is_calibrated_with_the_frames_of_the_search(service, name):
+    job = found(service, name, place=site(name, "partly"))
+    assert refused(calibrate(service, job)) == (404, "venue-not-found")
+    adopt(service, name, job, right=None).raise_for_status()
+    answer = calibrate(service, job)
+    assert (answer.status_code, answer.json()["kind"], answer.json()["venue"]) == (202, "calibration", name)
+    assert answer.headers["location"] == f"/jobs/{answer.json()['id']}"
+    calibration = service.end(answer.json()["id"])
+    # Of the camera that was left out, the frame is too.
+    assert list(calibration["frames"]) == ["left"]
+    assert calibration["venue_revision"] == 2
+    frames = [service.http.get(one["frames"]["left"][0]).content for one in (job, calibration)]
+    assert frames[0] == frames[1]
+
+
+def test_the_frames_of_a_search_are_one_calibration_while_that_is_open(service, name):
+    service.venue(name)
+    job = found(service, name)
+    service.venue(name, "hang")
+    one, other = calibrate(service, job), calibrate(service, job)
+    assert (one.status_code, other.status_code) == (202, 200)
+    assert one.json()["id"] == other.json()["id"]
+    service.http.post(f"/jobs/{one.json()['id']}/cancel")
+
+
+def test_why_the_frames_of_a_job_calibrate_nothing_is_said(service, name):
+    service.venue(name)
+    assert refused(calibrate(service, service.calibrated(name))) == (404, "poses-not-found")
+    partial = calibrate(service, found(service, name, files=upload(cameras=("left",))))
+    assert refused(partial) == (422, "missing-camera")
+    assert "no frame of right" in partial.json()["detail"]
+    job = found(service, name)
+    forget_frames(service, job)
+    assert refused(calibrate(service, job)) == (410, "frames-deleted")
+
+
+def calibrate(service, job):
+    return service.http.post(f"/jobs/{job['id']}/calibrate")
+
+
+def forget_frames(service, job):
+    """Let the frames of a job expire."""
+    with service.database() as connection:
+        gone = sa.update(tables.jobs).where(tables.jobs.c.id == job["id"]).values(frames_deleted_at=datetime.now(UTC))
+        connection.execute(gone)
 
 
 def test_a_new_venue_gets_the_ridge_that_was_found_with_its_cameras(service, name):

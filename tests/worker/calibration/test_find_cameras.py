@@ -43,15 +43,29 @@ def test_a_pair_is_found_on_one_side_and_fits_together():
     assert found.stitch_error_px < 0.2
 
 
-def test_what_was_assumed_of_the_side_is_said():
+def test_what_was_assumed_of_the_side_is_said_and_the_other_side_is_the_second_candidate():
     remarks = [remark for camera in both()[0].cameras for remark in camera.remarks]
-    assert any("stands on the near side" in remark for remark in remarks)
+    assert any("assumed: it stands on the near side" in remark for remark in remarks)
+    for camera in both()[0].cameras:
+        here, there = (candidate.camera.pose for candidate in camera.candidates[:2])
+        assert camera.assumed_side == "near"
+        assert there.position == pytest.approx(here.position * (-1, -1, 1))
+        # Half a turn about z takes one to the other.
+        assert there.matrix == pytest.approx(here.matrix * (-1, -1, 1))
 
 
 def test_progress_grows_from_stage_to_stage():
     _, steps = both()
+    _, steps = both()
     assert [step.fraction for step in steps] == sorted(step.fraction for step in steps)
     assert list(dict.fromkeys(step.stage for step in steps)) == ["segmentation", "evolution", "refinement"]
+
+
+def test_each_camera_that_is_searched_for_says_how_long_the_others_will_take():
+    _, steps = both()
+    first, second = (step.remaining_s for step in steps if step.remaining_s is not None)
+    assert first > 0
+    assert second > 0
 
 
 def test_a_camera_is_found_beside_one_that_is_known():
@@ -59,6 +73,7 @@ def test_a_camera_is_found_beside_one_that_is_known():
     found = find_cameras(CROWNED, [sought(right)], [left], frames(), white_on_green, 1)
     (camera,) = found.cameras
     assert camera.accepted
+    assert camera.assumed_side is None
     assert np.linalg.norm(camera.candidates[0].camera.pose.position - right.pose.position) < 0.03
 
 

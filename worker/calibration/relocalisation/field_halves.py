@@ -78,8 +78,8 @@ def _on_the_near_side(camera: Camera) -> ChosenSide:
     taken = camera if side_of(camera) in ("near", "left") else other
     return ChosenSide(
         taken,
-        f"the field looks the same from the {side_of(twin(taken))} side; taken: camera {camera.id} stands on the "
-        f"{side_of(taken)} side",
+        f"from its lines alone camera {camera.id} could stand on the {side_of(taken)} or the {side_of(twin(taken))} "
+        f"side; assumed: it stands on the {side_of(taken)} side",
         decided=True,
     )
 

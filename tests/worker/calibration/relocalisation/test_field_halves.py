@@ -32,7 +32,7 @@ def test_a_camera_alone_is_taken_to_stand_on_the_near_side_and_that_is_said(foun
     (chosen,) = choose_sides([found], anywhere(found), [], UNSEEN)
     np.testing.assert_allclose(chosen.camera.pose.position, LEFT.pose.position)
     assert chosen.decided
-    assert "taken: camera left stands on the near side" in chosen.remark
+    assert "assumed: it stands on the near side" in chosen.remark
 
 
 @pytest.mark.parametrize("others", [RIGHT, twin(RIGHT)])
