@@ -109,19 +109,16 @@ def live(
 
     if not (opentrackio or freed or as_json):
         opentrackio = [MULTICAST]
-    words = [f"opentrackio {address}" for address in opentrackio or []]
-    words += [*(f"freed {address}" for address in freed or []), *(["json"] if as_json else [])]
     with UdpSocket(interface) as socket:
         destinations = _destinations(socket, opentrackio or [], freed or [], as_json=as_json)
         stored = load_venue(venue, url, api_key)
         service = None if Path(venue).is_file() else (url, api_key)
-        _send(stored, destinations, words, beat, addresses, follow_every, predict / 1000, service, recover=recover)
+        _send(stored, destinations, beat, addresses, follow_every, predict / 1000, service, recover=recover)
 
 
 def _send(
     stored: Venue,
-    destinations: Sequence[Destination],
-    words: Sequence[str],
+    destinations: Mapping[str, Destination],
     beat: Fraction,
     addresses: Mapping[str, str],
     every: int,
@@ -130,7 +127,7 @@ def _send(
     *,
     recover: bool,
 ) -> None:
-    """Send poses until stopped. `words`: of the destinations; `service`: its address and key, where there is one.
+    """Send poses to destinations, by their names, until stopped. `service`: its address and key, where there is one.
 
     It is asked for new poses, told how those that are sent are doing, and with `recover` asked for calibrations.
     """
@@ -139,9 +136,21 @@ def _send(
     from service.live.reports import LiveReporter
     from service.live.stored_poses import StoredPoses, send_stored_poses
 
-    poses, stop, trouble = StoredPoses(stored), threading.Event(), OngoingTrouble()
-    sender = PoseSender(destinations, lambda error: trouble.say(f"Not sent: {error}"))
-    reporter = LiveReporter(poses, addresses, words)
+    poses, stop, unread = StoredPoses(stored), threading.Event(), threading.Event()
+    troubles = {name: OngoingTrouble() for name in destinations}
+
+    def tell(name: str, error: OSError | None) -> None:
+        if error is None:
+            troubles[name].over(f"Sent to {name} again")
+        else:
+            troubles[name].say(f"Not sent to {name}: {error}")
+
+    def end_unread() -> None:
+        unread.set()
+        stop.set()
+
+    sender = PoseSender(destinations, tell, end_unread)
+    reporter = LiveReporter(poses, addresses, [*destinations])
     streams = TrackedStreams.of(stored, addresses, every, ahead_s, sender, reporter.sent)
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: stop.set())
@@ -160,7 +169,9 @@ def _send(
     streams.stop()
     for thread in beside:
         thread.join(LAST_REPORT_S)
-    print_note("Stopped.")
+    # A filter whose reader has gone says nothing.
+    if not unread.is_set():
+        print_note("Stopped.")
 
 
 def _report(reporter: LiveReporter, url: str, api_key: str | None, stop: threading.Event) -> None:
@@ -236,18 +247,20 @@ class _RecoveryNotes:
 
 def _destinations(
     socket: UdpSocket, opentrackio: Sequence[str], freed: Sequence[str], *, as_json: bool
-) -> list[Destination]:
+) -> dict[str, Destination]:
+    """Return the destinations by their names, which reports and notes have."""
     from service.live.destinations import OPENTRACKIO_PORT, FreeD, JsonLines, OpenTrackIO
 
-    found: list[Destination] = [
-        OpenTrackIO(socket)
+    found: dict[str, Destination] = {
+        f"opentrackio {address}": OpenTrackIO(socket)
         if address == MULTICAST
         else OpenTrackIO(socket, *_parse_address(address, "--opentrackio", OPENTRACKIO_PORT))
         for address in opentrackio
-    ]
+    }
     axes = load_settings().freed_axes if freed else ""
-    found += [FreeD(socket, *_parse_address(address, "--freed", None), axes) for address in freed]
-    return [*found, JsonLines(sys.stdout)] if as_json else found
+    for address in freed:
+        found[f"freed {address}"] = FreeD(socket, *_parse_address(address, "--freed", None), axes)
+    return found | {"json": JsonLines(sys.stdout)} if as_json else found
 
 
 def _parse_address(text: str, option: str, usual_port: int | None) -> tuple[str, int]:

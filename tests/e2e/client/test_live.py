@@ -79,6 +79,21 @@ def test_poses_go_on_when_the_service_is_gone(start, name):
         assert number in (1, 2)
 
 
+@pytest.mark.parametrize("arguments", [["live", "tests/demo/venue.json", "--json"], ["venue", "check", "--help"]])
+def test_a_command_whose_output_nobody_reads_any_more_ends_in_silence(arguments):
+    reads, writes = os.pipe()
+    os.close(reads)
+    with warm.Popen([sys.executable, "-m", "service.cli", *arguments], stdout=writes, stderr=PIPE, text=True) as process:
+        os.close(writes)
+        try:
+            told = process.communicate(timeout=60)[1]
+        finally:
+            process.kill()
+    # 1 is Typer's own, where printing itself fails.
+    assert process.returncode in (0, 1)
+    assert [line for line in told.splitlines() if not line.startswith("Sending the poses")] == []
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
