@@ -89,7 +89,7 @@ def _fetch(target: httpx.URL, credentials: str | None, task: SourceTask) -> byte
     except mjpeg.NotMultipartError:
         raise NoFrameError("it calls itself a row of pictures (multipart) and has no parts") from None
     except httpx.HTTPError as error:
-        raise NoFrameError(f"{type(error).__name__}: {error}") from None
+        raise NoFrameError(outbound_guard.failure_text(error)) from None
 
 
 async def _picture(target: httpx.URL, address: str, credentials: str | None, task: SourceTask) -> bytes:
@@ -124,7 +124,7 @@ async def _body(response: httpx.Response, task: SourceTask) -> bytes:
             f"it answered {response.status_code}, and leads elsewhere; give the address that it leads to"
         )
     if response.status_code != httpx.codes.OK:
-        raise NoFrameError(f"it answered {response.status_code} {response.reason_phrase}")
+        raise NoFrameError(f"it answered {response.status_code}")
     endless = response.headers.get("content-type", "").lower().startswith("multipart/")
     size, data, first_part = 0, bytearray(), mjpeg.FirstPart()
     async for chunk in response.aiter_bytes():

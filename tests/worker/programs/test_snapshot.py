@@ -5,6 +5,7 @@ import subprocess
 import sys
 import threading
 import time
+from contextlib import suppress
 
 import cv2
 import httpx
@@ -17,6 +18,7 @@ from service.schemas.venue import VenueIn
 from service.settings import Settings
 from tests.e2e.running import venue
 from tests.worker.certificates import certificate
+from tests.worker.receiver import TELLTALE
 from tests.worker.sources.streaming_camera import ASKS, SIZE, StreamingCamera
 from worker.sources.rtsp_relay import Relay
 
@@ -168,3 +170,22 @@ def test_the_program_loads_no_models_of_venues_and_results():
     told = subprocess.run([sys.executable, "-c", modules], capture_output=True, text=True, check=True)
     assert "service.schemas.programs.sources" in told.stdout.split()
     assert not {"service.intake", "service.schemas.venue", "service.schemas.results"} & set(told.stdout.split())
+
+
+@pytest.mark.parametrize("says", TELLTALE)
+@pytest.mark.parametrize("userinfo", [None, RIGHT])
+def test_nothing_that_the_host_of_a_source_says_is_read_through_its_refusal(tmp_path, says, userinfo):
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+
+        def answer():
+            with suppress(OSError):
+                while True:
+                    connection, _ = listener.accept()
+                    with connection:
+                        connection.recv(4096)
+                        connection.sendall(says)
+
+        threading.Thread(target=answer, daemon=True).start()
+        detail = refused(tmp_path, "http://{}:{}/picture".format(*listener.getsockname()), userinfo)
+    assert "hunter2" not in detail
+    assert "bytearray" not in detail
