@@ -10,7 +10,7 @@ import time
 LOOK_UP_AGAIN_S = 60.0
 # After a look-up that failed.
 FAILED_AGAIN_S = 5.0
-# A first look-up that goes on for longer is trouble; most take milliseconds, and a resolver's own time-out is 5 s or more.
+# A first look-up that goes on for longer is trouble; most take milliseconds, a resolver's own time-out is 5 s at least.
 SLOW_S = 3.0
 
 

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
-
 # What servers say of their own accord, which nobody is to read through the service.
 TELLTALE = (
     b"220 admin console, token=hunter2\r\n\r\n",

@@ -83,7 +83,9 @@ def test_poses_go_on_when_the_service_is_gone(start, name):
 def test_a_command_whose_output_nobody_reads_any_more_ends_in_silence(arguments):
     reads, writes = os.pipe()
     os.close(reads)
-    with warm.Popen([sys.executable, "-m", "service.cli", *arguments], stdout=writes, stderr=PIPE, text=True) as process:
+    with warm.Popen(
+        [sys.executable, "-m", "service.cli", *arguments], stdout=writes, stderr=PIPE, text=True
+    ) as process:
         os.close(writes)
         try:
             told = process.communicate(timeout=60)[1]

@@ -211,7 +211,10 @@ def silent_names(monkeypatch):
 def test_a_name_server_that_is_silent_holds_up_no_other_destination(udp, silent_names):
     axes = "x y z pan tilt roll"
     with listening() as by_address, listening() as by_name:
-        destinations = [FreeD(udp, "renderer", port_of(by_name), axes), FreeD(udp, "127.0.0.1", port_of(by_address), axes)]
+        destinations = [
+            FreeD(udp, "renderer", port_of(by_name), axes),
+            FreeD(udp, "127.0.0.1", port_of(by_address), axes),
+        ]
         with Sending(destinations) as sending:
             # Fifty moments of two cameras; before, the first look-up was waited for.
             for _ in range(100):
@@ -249,7 +252,7 @@ def test_a_name_is_looked_up_beside_the_sending_and_the_last_answer_holds(monkey
 @pytest.fixture
 def pipe():
     reads, writes = os.pipe()
-    with open(reads) as reader, suppress(BrokenPipeError), open(writes, "w") as writer:
+    with os.fdopen(reads) as reader, suppress(BrokenPipeError), os.fdopen(writes, "w") as writer:
         yield reader, writer
 
 
@@ -264,9 +267,9 @@ def test_a_program_that_reads_lines_no_more_ends_the_sending_if_it_was_alone(pip
 
 def test_a_program_that_reads_lines_no_more_or_slowly_holds_up_no_renderer(pipe, udp):
     reader, writer = pipe
-    axes = "x y z pan tilt roll"
     with listening() as opened:
-        with Sending([JsonLines(writer), FreeD(udp, "127.0.0.1", port_of(opened), axes)]) as sending:
+        renderer = FreeD(udp, "127.0.0.1", port_of(opened), "x y z pan tilt roll")
+        with Sending([JsonLines(writer), renderer]) as sending:
             while not sending.errors:
                 opened.recv(64)
             opened.recv(64)
