@@ -5,6 +5,7 @@ from __future__ import annotations
 import socket
 import threading
 import time
+from typing import Any
 
 # A renderer that got another address is sent to again after so long; no resolver minds the question.
 LOOK_UP_AGAIN_S = 60.0
@@ -15,7 +16,7 @@ SLOW_S = 3.0
 
 
 # Family, and what `socket.sendto` takes.
-SocketAddress = tuple[int, tuple[str | int, ...]]
+SocketAddress = tuple[int, tuple[Any, ...]]
 
 
 class HostLookup:

@@ -44,7 +44,8 @@ AGAIN_S = (0.2, 1.0)
 # The hash at the end of an object's path, by which it is known again: SHA-256. Objects of older versions have none.
 HASH = re.compile(r"\.([0-9a-f]{64})$")
 log = structlog.get_logger()
-Arguments, Returned = ParamSpec("Arguments"), TypeVar("Returned")
+Arguments = ParamSpec("Arguments")
+Returned = TypeVar("Returned")
 
 
 def _raising_blob_outages(
