@@ -30,6 +30,8 @@ LOOK_AGAIN_S = 2.0
 # For the last report when it is stopped; a service that hangs is not waited for.
 LAST_REPORT_S = 2.0
 HIGHEST_RATE = 1000
+# What ran before a restart counts as running for five seconds after its last report.
+OTHERS_AFTER_S, OTHERS_AGAIN_S = 6.0, 30.0
 MULTICAST = "multicast"
 
 
@@ -156,7 +158,7 @@ def _send(
         signal.signal(number, lambda *_: stop.set())
     beside = []
     if service is not None:
-        threading.Thread(target=_ask_for_poses, args=(poses, streams, *service, stop), daemon=True).start()
+        threading.Thread(target=_ask_for_poses, args=(poses, streams, reporter, *service, stop), daemon=True).start()
         beside = [threading.Thread(target=_report, args=(reporter, *service, stop), daemon=True)]
         if recover:
             threading.Thread(target=_recover, args=(stored.id, streams, *service, stop), daemon=True).start()
@@ -189,21 +191,33 @@ def _report(reporter: LiveReporter, url: str, api_key: str | None, stop: threadi
 
 
 def _ask_for_poses(
-    poses: StoredPoses, streams: TrackedStreams, url: str, api_key: str | None, stop: threading.Event
+    poses: StoredPoses,
+    streams: TrackedStreams,
+    reporter: LiveReporter,
+    url: str,
+    api_key: str | None,
+    stop: threading.Event,
 ) -> None:
-    """Ask for the venue's poses again and again; where the service does not answer, the last ones hold."""
+    """Ask for the venue's poses again and again; where the service does not answer, the last ones hold.
+
+    Now and then it asks as well who else sends poses of the venue.
+    """
     import time
 
     import httpx
 
     from service.client import Client, NotUnderstood, Refused
 
-    trouble, venue = OngoingTrouble(), poses.venue.id
+    trouble, company, venue = OngoingTrouble(), OngoingTrouble(), poses.venue.id
+    look_for_others_s = time.monotonic() + OTHERS_AFTER_S
     with Client(url, api_key) as client:
         while not stop.wait(LOOK_AGAIN_S):
             try:
                 now = client.venue(venue)
                 new = poses.replace(now, time.monotonic())
+                if time.monotonic() >= look_for_others_s:
+                    look_for_others_s = time.monotonic() + OTHERS_AGAIN_S
+                    _print_company(company, reporter.running_others(client.live(venue)))
             except (Refused, NotUnderstood, httpx.HTTPError) as error:
                 trouble.say(f"Poses stay as they are, the service does not tell them: {error}")
                 continue
@@ -211,6 +225,15 @@ def _ask_for_poses(
             if new:
                 streams.anchor([camera for camera in now.cameras if camera.id in new])
                 print_note(f"New pose or lens: {', '.join(new)}")
+
+
+def _print_company(company: OngoingTrouble, others: Sequence[str]) -> None:
+    if others:
+        company.say(
+            f"Also sending poses of this venue: {', '.join(others)}. Each is watched by itself: end one of them"
+        )
+    else:
+        company.over("No other process sends poses of this venue any more")
 
 
 def _recover(venue: str, streams: TrackedStreams, url: str, api_key: str | None, stop: threading.Event) -> None:
