@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from service.cli.arguments import DEFAULT_URL, ApiKey, Url, load_settings, parse_by_camera
+from service.cli.arguments import DEFAULT_URL, ApiKey, Url, load_settings, parse_by_camera, require_cameras
 from service.cli.printing import USAGE, OngoingTrouble, fail, outcome_text, print_note
 from service.cli.service_client import load_venue
 
@@ -78,6 +78,17 @@ def live(
     freed: Annotated[
         list[str] | None, typer.Option("--freed", metavar="HOST:PORT", help="Send FreeD D1 packets there.")
     ] = None,
+    zoom: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--zoom",
+            metavar="CAMERA=COUNT",
+            help="Send this count as the zoom of a camera by FreeD, 0 to 16777215: one of the renderer's lens file.",
+        ),
+    ] = None,
+    focus: Annotated[
+        list[str] | None, typer.Option("--focus", metavar="CAMERA=COUNT", help="The same as its focus.")
+    ] = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print a line of JSON for each sample on standard output.")
     ] = False,
@@ -107,13 +118,17 @@ def live(
     if recover and (Path(venue).is_file() or not addresses):
         fail("--recover has the service calibrate a venue of its own whose cameras are tracked in streams", USAGE)
     beat = _parse_rate(rate)
+    zooms, focuses = _parse_counts(zoom or [], "--zoom"), _parse_counts(focus or [], "--focus")
+    if (zooms or focuses) and not freed:
+        fail("--zoom and --focus are sent by FreeD alone: add --freed HOST:PORT", USAGE)
     from service.live.destinations import UdpSocket
 
     if not (opentrackio or freed or as_json):
         opentrackio = [MULTICAST]
     with UdpSocket(interface) as socket:
-        destinations = _destinations(socket, opentrackio or [], freed or [], as_json=as_json)
+        destinations = _destinations(socket, opentrackio or [], freed or [], zooms, focuses, as_json=as_json)
         stored = load_venue(venue, url, api_key)
+        require_cameras(stored, [*zooms, *focuses])
         service = None if Path(venue).is_file() else (url, api_key)
         _send(stored, destinations, beat, addresses, follow_every, predict / 1000, service, recover=recover)
 
@@ -269,9 +284,16 @@ class _RecoveryNotes:
 
 
 def _destinations(
-    socket: UdpSocket, opentrackio: Sequence[str], freed: Sequence[str], *, as_json: bool
+    socket: UdpSocket,
+    opentrackio: Sequence[str],
+    freed: Sequence[str],
+    zooms: Mapping[str, int],
+    focuses: Mapping[str, int],
+    *,
+    as_json: bool,
 ) -> dict[str, Destination]:
     """Return the destinations by their names, which reports and notes have."""
+    from service.formats.freed import EncoderCounts
     from service.live.destinations import OPENTRACKIO_PORT, FreeD, JsonLines, OpenTrackIO
 
     found: dict[str, Destination] = {
@@ -281,8 +303,11 @@ def _destinations(
         for address in opentrackio
     }
     axes = load_settings().freed_axes if freed else ""
+    counts = {
+        camera: EncoderCounts(zooms.get(camera, 0), focuses.get(camera, 0)) for camera in zooms.keys() | focuses.keys()
+    }
     for address in freed:
-        found[f"freed {address}"] = FreeD(socket, *_parse_address(address, "--freed", None), axes)
+        found[f"freed {address}"] = FreeD(socket, *_parse_address(address, "--freed", None), axes, counts)
     return found | {"json": JsonLines(sys.stdout)} if as_json else found
 
 
@@ -293,6 +318,16 @@ def _parse_address(text: str, option: str, usual_port: int | None) -> tuple[str,
     if match is None or port is None or not 0 < int(port) < 65536:
         fail(f"{option} {text}: expected HOST:PORT, such as 10.1.0.20:40000", USAGE)
     return match["six"] or match["host"], int(port)
+
+
+def _parse_counts(arguments: Sequence[str], option: str) -> dict[str, int]:
+    from service.formats.freed import LARGEST_COUNT
+
+    counts = parse_by_camera(arguments, f"CAMERA=COUNT of {option}, for instance left=32768")
+    for camera, count in counts.items():
+        if not (count.isascii() and count.isdecimal() and int(count[:9]) <= LARGEST_COUNT and len(count) < 9):
+            fail(f"{option} {camera}={count}: expected a count from 0 to {LARGEST_COUNT}", USAGE)
+    return {camera: int(count) for camera, count in counts.items()}
 
 
 def _parse_rate(text: str) -> Fraction:

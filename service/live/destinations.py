@@ -9,7 +9,7 @@ import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from fractions import Fraction
 from io import TextIOWrapper
@@ -118,12 +118,13 @@ class OpenTrackIO:
     socket: UdpSocket
     host: str | None = None
     port: int = OPENTRACKIO_PORT
+    _angles: opentrackio.SteadyAngles = field(default_factory=opentrackio.SteadyAngles, init=False)
 
     def send(self, samples: Sequence[Sample]) -> None:
         """Send a sample of each camera, in as many datagrams as it takes."""
         for sample in samples:
             host = self.host or OPENTRACKIO_GROUP.format(number=sample.shot.number)
-            content = opentrackio.write_moment(sample.shot, sample.moment)
+            content = opentrackio.write_moment(sample.shot, sample.moment, self._angles)
             for datagram in datagrams(content, sample.moment.number):
                 self.socket.send(datagram, host, self.port)
 
@@ -136,11 +137,12 @@ class FreeD:
     host: str
     port: int
     axes: str
+    counts: Mapping[str, freed.EncoderCounts] | None = None
 
     def send(self, samples: Sequence[Sample]) -> None:
         """Send a packet of each camera."""
         for sample in samples:
-            self.socket.send(freed.write([sample.shot], self.axes), self.host, self.port)
+            self.socket.send(freed.write([sample.shot], self.axes, self.counts), self.host, self.port)
 
 
 @dataclass(frozen=True)

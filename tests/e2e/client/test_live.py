@@ -104,6 +104,11 @@ def test_a_command_whose_output_nobody_reads_any_more_ends_in_silence(arguments)
         (["--rate", "0"], "--rate 0: samples a second"),
         (["--freed", "10.1.0.20"], "--freed 10.1.0.20: expected HOST:PORT"),
         (["--opentrackio", "10.1.0.20:70000"], "expected HOST:PORT"),
+        (["--zoom", "left=5"], "--zoom and --focus are sent by FreeD alone"),
+        (
+            ["--freed", "10.1.0.20:40000", "--focus", "left=16777216"],
+            "--focus left=16777216: expected a count from 0 to",
+        ),
     ],
 )
 def test_what_is_no_rate_or_address_is_a_usage_error(service, tmp_path, arguments, said):
