@@ -60,7 +60,9 @@ class Settings(BaseSettings):
     model: Path = Field(MODEL_BESIDE_THE_CODE, description="The segmentation network, an ONNX file.")
 
     # Listening.
-    host: str = Field("127.0.0.1", description="Address to listen on.")
+    host: str = Field(
+        "127.0.0.1", description="Address to listen on; `0.0.0.0`: all of IPv4, `::`: all of IPv4 and IPv6."
+    )
     port: int = Field(8000, ge=0, le=65535, description="Port to listen on; 0 takes a free one and prints it.")
     root_path: str = Field(
         "",
