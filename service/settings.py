@@ -52,6 +52,11 @@ class Settings(BaseSettings):
         description="Database: `postgresql://user:password@host:5432/name` or `sqlite:////folder/file`. Absent: SQLite "
         "in the data folder. `ESC_DATABASE_URL_FILE` may name a file that holds it.",
     )
+    sqlite_on_network: bool = Field(
+        default=False,
+        description="`true`: SQLite may lie on a network file system (NFS, SMB and the like), which is refused "
+        "otherwise. For API and worker of one machine alone.",
+    )
     blob_url: str | None = Field(
         None,
         description="Object store of frames and pictures: `s3://bucket/folder` or `file:///folder`. Absent: `blobs` in "

@@ -44,8 +44,10 @@ def worker(
     from worker import supervisor
 
     try:
+        settings = load_settings(data=data, worker_name=name)
         with report_database_errors():
-            supervisor.run(load_settings(data=data, worker_name=name))
+            _check_database_place(settings)
+            supervisor.run(settings)
     except AlreadyRunning as error:
         fail(str(error), USAGE)
 
@@ -56,9 +58,17 @@ def _serve(settings: Settings, *, with_worker: bool) -> None:
 
     try:
         with report_database_errors():
+            _check_database_place(settings)
             serving.serve(settings, with_worker=with_worker)
     except (serving.CannotListen, AlreadyRunning) as error:
         fail(str(error), USAGE)
+
+
+def _check_database_place(settings: Settings) -> None:
+    from service.store.database import require_local_file
+
+    if not settings.sqlite_on_network:
+        require_local_file(settings.home_database_url)
 
 
 @contextmanager
