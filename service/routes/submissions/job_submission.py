@@ -118,7 +118,8 @@ def _submission(
         # All of them before the first is read: a size costs nothing.
         image_checks.check_length(upload.size or 0, context.settings, **{part: name})
     cameras = {camera.id: camera for camera in about.cameras} if about else {}
-    hashes: dict[str, list[str]] = {}
+    # A camera without a frame is named all the same: points are enough for its pose.
+    hashes: dict[str, list[str]] = {name: [] for name in files}
     for name, several in files.items():
         content.update(f"\n{name}".encode())
         for upload in several:
@@ -129,7 +130,7 @@ def _submission(
                     image_checks.check(cameras[name], data, context.settings)
                 digest = hashlib.sha256(data)
                 content.update(digest.digest())
-                hashes.setdefault(name, []).append(digest.hexdigest())
+                hashes[name].append(digest.hexdigest())
             del data
     # A photo may be called anything.
     photos = {
