@@ -240,7 +240,9 @@ class Worker:
             except Exception as error:  # an attempt that raises would leave the job open and nobody at it
                 log.exception("job broke off")
                 verdict = "job-crashed"
-                crashed = _error("job-crashed", f"The attempt broke off: {type(error).__name__}; see the worker's log.")
+                # In the words of the operating system, but not in those of a server.
+                why = str(error) if isinstance(error, OSError) else type(error).__name__
+                crashed = _error("job-crashed", f"The attempt broke off: {why}; see the worker's log.")
                 _retry_until(lambda: self._attempts.fail(task, crashed), time.monotonic() + OUTAGE_S)
             log.info("job ends", verdict=verdict, seconds=round(time.monotonic() - begun, 2))
 
