@@ -57,8 +57,7 @@ def create_app(settings: Settings) -> FastAPI:
     app.add_middleware(BodyLimit, largest_form=int(settings.max_body_mb * 1e6))
     app.add_middleware(RequestLog, metrics=context.metrics)
     app.add_middleware(HttpDefaults)
-    if settings.root_path:
-        app.add_middleware(RootPath, root_path=settings.root_path)
+    app.add_middleware(RootPath, root_path=settings.root_path)
     documented.document_callback(app)
     documented.document_alarms(app)
     documented.document_events(app)

@@ -35,6 +35,8 @@ GRACE_S = 5
 RESTART_AFTER_S = 1.0
 RESTART_AT_LEAST_EVERY_S = 30.0
 YOUNG_S = 10.0
+EVERYWHERE, EVERYWHERE_IPV4 = "::", "0.0.0.0"
+NO_SUCH_FAMILY = (errno.EAFNOSUPPORT, errno.EADDRNOTAVAIL)
 ACCEPTED_AT_ONCE, WAITING_AT_THE_DOOR = 32, 2048
 # Of uvicorn's ticks, ten a second.
 TICKS_PER_LOOK = 10
@@ -45,12 +47,16 @@ class CannotListen(Exception):  # noqa: N818
     """The address cannot or must not be used; the message says what to do."""
 
 
+class _NoSuchFamily(CannotListen):
+    """The machine has no address of this version of IP."""
+
+
 def serve(settings: Settings, *, with_worker: bool) -> None:
     """Answer requests until SIGTERM or SIGINT."""
     if with_worker:
         # Asked here, where somebody sees the answer; the worker itself holds the lock.
         lock_worker(settings).close()
-    listener = _listen(settings)
+    listeners = _listen(settings)
     tracing.configure("esc-api", socket.gethostname())
     app = create_app(settings)
     _see_to_keys(settings, app.state.context.keys)
@@ -64,8 +70,8 @@ def serve(settings: Settings, *, with_worker: bool) -> None:
         return settings.worker_name in [worker.name for worker in workers.alive(settings.takeover_after_s)]
 
     with KeptWorker(settings, name_is_taken) if with_worker else nullcontext() as kept:
-        print(f"ESC listens on http://{_authority(*listener.getsockname()[:2])}", flush=True)
-        server.run(sockets=[listener])
+        print(f"ESC listens on http://{_authority(*listeners[0].getsockname()[:2])}", flush=True)
+        server.run(sockets=listeners)
     tracing.flush()
     if kept is not None and kept.refused:
         raise AlreadyRunning("The worker of this service cannot run; its last line above says why.")
@@ -84,11 +90,24 @@ def _see_to_keys(settings: Settings, keys: KeyRepository) -> None:
         )
 
 
-def _listen(settings: Settings) -> socket.socket:
+def _listen(settings: Settings) -> list[socket.socket]:
+    if settings.host != EVERYWHERE:
+        return [_listener(settings.host, settings.port)]
+    listeners = [_listener(EVERYWHERE, settings.port)]
+    port = listeners[0].getsockname()[1]
+    try:
+        # One socket for both would name clients of IPv4 ::ffff:10.1.0.5, which no limit and no log is about.
+        listeners.append(_listener(EVERYWHERE_IPV4, port))
+    except _NoSuchFamily:
+        log.warning("this machine has no IPv4, listening on IPv6 alone")
+    return listeners
+
+
+def _listener(host: str, port: int) -> socket.socket:
     try:
         return socket.create_server(
-            (settings.host, settings.port),
-            family=socket.AF_INET6 if ":" in settings.host else socket.AF_INET,
+            (host, port),
+            family=socket.AF_INET6 if ":" in host else socket.AF_INET,
             backlog=WAITING_AT_THE_DOOR,
         )
     except OSError as error:
@@ -96,7 +115,8 @@ def _listen(settings: Settings) -> socket.socket:
         # Names that nobody can look up have numbers of their own, below zero.
         is_unknown = error.errno is not None and error.errno < 0
         why = "no such host" if is_unknown else os.strerror(error.errno) if error.errno else str(error)
-        raise CannotListen(f"Cannot listen on {_authority(settings.host, settings.port)}: {why}.{taken}") from None
+        failed = _NoSuchFamily if error.errno in NO_SUCH_FAMILY else CannotListen
+        raise failed(f"Cannot listen on {_authority(host, port)}: {why}.{taken}") from None
 
 
 def _authority(host: str, port: int) -> str:

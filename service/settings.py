@@ -53,6 +53,11 @@ class Settings(BaseSettings):
         description="Database: `postgresql://user:password@host:5432/name` or `sqlite:////folder/file`. Absent: SQLite "
         "in the data folder. `ESC_DATABASE_URL_FILE` may name a file that holds it.",
     )
+    sqlite_on_network: bool = Field(
+        default=False,
+        description="`true`: SQLite may lie on a network file system (NFS, SMB and the like), which is refused "
+        "otherwise. For API and worker of one machine alone.",
+    )
     blob_url: str | None = Field(
         None,
         description="Object store of frames and pictures: `s3://bucket/folder` or `file:///folder`. Absent: `blobs` in "
@@ -61,7 +66,9 @@ class Settings(BaseSettings):
     model: Path = Field(MODEL_BESIDE_THE_CODE, description="The segmentation network, an ONNX file.")
 
     # Listening.
-    host: str = Field("127.0.0.1", description="Address to listen on.")
+    host: str = Field(
+        "127.0.0.1", description="Address to listen on; `0.0.0.0`: all of IPv4, `::`: all of IPv4 and IPv6."
+    )
     port: int = Field(8000, ge=0, le=65535, description="Port to listen on; 0 takes a free one and prints it.")
     root_path: str = Field(
         "",

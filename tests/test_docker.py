@@ -45,7 +45,7 @@ def test_the_image_installs_by_hash_and_compiles_nothing_and_runs_as_nobody_spec
     last = DOCKERFILE[DOCKERFILE.rindex("FROM ") :]
     assert re.search(r"^USER 10001:10001$", last, re.MULTILINE)
     assert not re.search(r"apt-get|gcc|pip", last)
-    assert "/livez" in last
+    assert "service.cli.livez" in last
 
 
 def test_a_machine_that_cannot_try_the_image_says_so_and_is_told_apart_from_a_broken_image():

@@ -4,19 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from service.schemas.problems import first_line
+import structlog
+
 from service.settings import Settings
-from service.store.blobs import BLOB_OUTAGES, Blobs
+from service.store.blobs import BLOB_OUTAGES, Blobs, DamagedBlob, outage_text
 from service.store.jobs.files import picture_file, picture_folder
 from service.store.jobs.task import Task
 
+log = structlog.get_logger()
+
 
 class FileUnavailableError(Exception):
-    """The blob store cannot read or write a file; the message says why. `camera`: whose file it is, or None."""
+    """The blob store cannot read or write a file; the message says why, `kind` which problem that is of a job.
 
-    def __init__(self, detail: str, camera: str | None = None) -> None:
+    `camera`: whose file it is, or None.
+    """
+
+    def __init__(self, detail: str, camera: str | None = None, kind: str = "job-crashed") -> None:
         super().__init__(detail)
         self.camera = camera
+        self.kind = kind
 
 
 class JobFiles:
@@ -31,9 +38,13 @@ class JobFiles:
 
     def _frame(self, camera: str, path: str) -> bytes:
         try:
-            data = self._blobs.get(path)
+            data = self._blobs.read(path)
+        except DamagedBlob as error:
+            detail = f"The stored frame of {camera} was damaged in the store: {error}. Send it again."
+            raise FileUnavailableError(detail, camera, "broken-image") from error
         except BLOB_OUTAGES as error:
-            raise FileUnavailableError(f"A stored frame cannot be read: {first_line(error)}", camera) from error
+            log.warning("a stored frame cannot be read", path=path, exc_info=True)
+            raise FileUnavailableError(f"A stored frame cannot be read: {outage_text(error)}", camera) from error
         if data is None:
             raise FileUnavailableError(f"The stored frame {path} is gone.", camera)
         return data
@@ -44,4 +55,5 @@ class JobFiles:
             try:
                 self._blobs.put(f"{picture_folder(task.job_id, task.run_token)}/{picture_file(name)}", picture)
             except BLOB_OUTAGES as error:
-                raise FileUnavailableError(f"Its pictures cannot be stored: {first_line(error)}") from error
+                log.warning("a picture cannot be stored", picture=name, exc_info=True)
+                raise FileUnavailableError(f"Its pictures cannot be stored: {outage_text(error)}") from error

@@ -25,7 +25,7 @@ from service.observability import tracing
 from service.queue import GivenUp, WorkerQueue
 from service.schemas.job import JobError
 from service.schemas.names import problem_uri
-from service.schemas.problems import PROBLEM_TYPES, first_line
+from service.schemas.problems import PROBLEM_TYPES
 from service.settings import Settings
 from service.store.database import DATABASE_OUTAGES, without_timeouts
 from service.store.expiry import ExpiryRepository
@@ -240,7 +240,9 @@ class Worker:
                 _retry_until(lambda: self._record_end(task, last), begun + limit_s + OUTAGE_S)
             except Exception as error:  # an attempt that raises would leave the job open and nobody at it
                 log.exception("job broke off")
-                crashed = _error("job-crashed", f"The attempt broke off: {first_line(error)}")
+                # In the words of the operating system, but not in those of a server.
+                why = str(error) if isinstance(error, OSError) else type(error).__name__
+                crashed = _error("job-crashed", f"The attempt broke off: {why}; see the worker's log.")
                 _retry_until(lambda: self._attempts.fail(task, crashed), time.monotonic() + OUTAGE_S)
                 last = Message(error=crashed)
             outcome = {"verdict": "taken away"} if last is None else last.outcome
@@ -258,7 +260,7 @@ class Worker:
         except JobTimeoutError:
             return Message(error=_error("job-timeout", f"It was ended after {limit_s:g} s; see timeout_s."))
         except FileUnavailableError as missing:
-            return Message(error=_error("job-crashed", str(missing), missing.camera))
+            return Message(error=_error(missing.kind, str(missing), missing.camera))
 
     def _store_pictures(self, task: Task, last: Message, pictures: dict[str, bytes], lease: Lease) -> Message:
         """Store the pictures. A result outlives pictures that cannot be stored: it gets a warning instead."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from math import inf
 from typing import Generic, TypeVar
 
 import structlog
@@ -23,12 +24,20 @@ log = structlog.get_logger()
 class ChangeWatch(Generic[State]):
     """Wakes coroutines when a job or venue reaches the state that they wait for, by one polling query for all.
 
-    `read`: the states of those with these names; `interval_s`: between two queries.
+    `read`: the states of those with these names; `interval_s`: between two queries; `patience_s`: who waits is let
+    go when nothing could be read for so long.
     """
 
-    def __init__(self, read: Callable[[Collection[str]], Mapping[str, State]], interval_s: float = INTERVAL_S) -> None:
+    def __init__(
+        self,
+        read: Callable[[Collection[str]], Mapping[str, State]],
+        interval_s: float = INTERVAL_S,
+        patience_s: float = inf,
+    ) -> None:
         self._read = read
         self._interval_s = interval_s
+        self._patience_s = patience_s
+        self._unread_since: float | None = None
         self._waiting: dict[asyncio.Future[State | None], tuple[str, Callable[[State], bool]]] = {}
         self._has_waiters = asyncio.Event()
         self._closed = False
@@ -41,7 +50,7 @@ class ChangeWatch(Generic[State]):
     async def until(self, name: str, reached: Callable[[State], bool], timeout_s: float) -> State | None:
         """Return the state of what has this name once `reached` holds of it.
 
-        Return None after `timeout_s`, or when the service goes down.
+        Return None after `timeout_s`, when the service goes down, or when nothing could be read for long.
         """
         if self._closed:
             return None
@@ -61,9 +70,14 @@ class ChangeWatch(Generic[State]):
             await self._has_waiters.wait()
             try:
                 states = await run_in_threadpool(self._read, {name for name, _ in self._waiting.values()})
+                self._unread_since = None
             except Exception:  # the database is away for a moment: they keep waiting, up to their time
                 log.warning("cannot read what is waited for", exc_info=True)
                 states = {}
+                now = asyncio.get_running_loop().time()
+                self._unread_since = self._unread_since or now
+                if now - self._unread_since > self._patience_s:
+                    self._let_go()
             for future, (name, reached) in self._waiting.items():
                 state = states.get(name)
                 if state is not None and reached(state) and not future.done():
@@ -75,6 +89,9 @@ class ChangeWatch(Generic[State]):
     def close(self) -> None:
         """Let everybody go, at once."""
         self._closed = True
+        self._let_go()
+
+    def _let_go(self) -> None:
         for future in self._waiting:
             if not future.done():
                 future.set_result(None)

@@ -29,6 +29,8 @@ from service.store.statistics.snapshot import read_statistics
 
 # As often as `esc live` reports.
 LIVE_INTERVAL_S = 0.5
+# A database that is away for longer than a restart ends streams: who follows is to know that nothing is told.
+STREAM_PATIENCE_S = 5.0
 
 
 class Context(ApplicationState):
@@ -40,8 +42,8 @@ class Context(ApplicationState):
         self.reads = SharedReads(self.jobs.get)
         interval_s = FILE_INTERVAL_S if sqlite_file(settings.home_database_url) else INTERVAL_S
         self.job_watch = ChangeWatch(self.jobs.states, interval_s)
-        self.venue_watch = ChangeWatch(self.events.newest, interval_s)
-        self.live_watch = ChangeWatch(self.live.newest, LIVE_INTERVAL_S)
+        self.venue_watch = ChangeWatch(self.events.newest, interval_s, STREAM_PATIENCE_S)
+        self.live_watch = ChangeWatch(self.live.newest, LIVE_INTERVAL_S, STREAM_PATIENCE_S)
         self.followers = ClientSlots(settings.followers, "clients follow venues", "ESC_FOLLOWERS")
         self.waiters = ClientSlots(settings.waiters, "clients wait for jobs", "ESC_WAITERS")
         self.metrics = Metrics(lambda: read_statistics(self.engine, settings.metrics_venues), self.disk, silence_s)

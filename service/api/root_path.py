@@ -7,6 +7,7 @@ the same for every process and in every webhook, and are appended to the URL tha
 from __future__ import annotations
 
 import re
+from urllib.parse import urlsplit, urlunsplit
 
 from starlette.datastructures import MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -23,10 +24,13 @@ def with_root_path(html: str, root_path: str) -> str:
 
 
 class RootPath:
-    """ASGI middleware, around all others: takes the path off requests that have it, and puts it into `Location`."""
+    """ASGI middleware, around all others: takes the path off requests that have it, and puts it into `Location`.
+
+    A `Location` is made relative to the host: which one the client names is his word, not an address of the service.
+    """
 
     def __init__(self, app: ASGIApp, root_path: str) -> None:
-        """`root_path`: begins with a slash and ends without one."""
+        """`root_path`: empty, or begins with a slash and ends without one."""
         self._app = app
         self._root_path = root_path
 
@@ -39,14 +43,16 @@ class RootPath:
         async def answer(message: Message) -> None:
             if message["type"] == "http.response.start":
                 headers = MutableHeaders(scope=message)
-                if (target := headers.get("location", "")).startswith("/"):
-                    headers["location"] = self._root_path + target
+                if target := headers.get("location"):
+                    headers["location"] = self._root_path + _without_host(target)
             await send(message)
 
         await self._app(self._below(scope), receive, answer)
 
     def _below(self, scope: Scope) -> Scope:
         path: str = scope["path"]
+        if not self._root_path:
+            return scope
         if path != self._root_path and not path.startswith(f"{self._root_path}/"):
             return scope
         raw_path: bytes = scope["raw_path"]
@@ -55,3 +61,10 @@ class RootPath:
             "path": path.removeprefix(self._root_path) or "/",
             "raw_path": raw_path.removeprefix(self._root_path.encode("ascii")) or b"/",
         }
+
+
+def _without_host(url: str) -> str:
+    """Return a URL of this service as its routes know it, such as Starlette's absolute one without a last slash."""
+    parts = urlsplit(url)
+    # A path that begins with two slashes would name a host.
+    return urlunsplit(("", "", "/" + parts.path.lstrip("/"), parts.query, parts.fragment))

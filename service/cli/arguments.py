@@ -6,7 +6,7 @@ import json
 import os
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from pydantic import BaseModel
 
     from service.schemas.options import Options
+    from service.schemas.venue import Venue
     from service.settings import Settings
 
 M = TypeVar("M", bound="BaseModel")
@@ -307,6 +308,13 @@ def parse_document(model: type[M], document: str | bytes, source: str, example: 
         told = describe_errors(found, model, json.loads(document) if is_json else None)
         lines = [f"{source}: {message}" for message in told]
         fail("\n".join([*lines, f"Expected is {example}"] if example else lines), USAGE)
+
+
+def require_cameras(venue: Venue, named: Iterable[str]) -> None:
+    """End the command unless the venue has every camera that is named."""
+    known = [camera.id for camera in venue.cameras]
+    if unknown := [camera for camera in dict.fromkeys(named) if camera not in known]:
+        fail(f"The venue has no camera {', '.join(unknown)}; it has {', '.join(known)}", USAGE)
 
 
 def parse_by_camera(arguments: Sequence[str], form: str) -> dict[str, str]:

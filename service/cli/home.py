@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import signal
+import sys
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +23,7 @@ if TYPE_CHECKING:
 
 # A bucket that does not answer is asked again for so long.
 BLOB_PATIENCE_S = 120.0
+ENDING = (signal.SIGTERM, signal.SIGHUP, signal.SIGINT)
 LOCATION_HELP = (
     "A data folder (with its esc.sqlite), or the URL of a database: postgresql://user:password@host:5432/name."
 )
@@ -72,7 +75,8 @@ def copy_home(
     blobs_there = there.blobs or blobs_here
     with report_database_errors():
         try:
-            files, rows = _copy(here.database, there.database, blobs_here, blobs_there)
+            with _ended_by_signals() as ignore_signals:
+                files, rows = _copy(here.database, there.database, blobs_here, blobs_there, ignore_signals)
         except CannotCopy as refusal:
             fail(f"Nothing was copied. {refusal}", USAGE)
         except BLOB_OUTAGES as error:
@@ -83,8 +87,41 @@ def copy_home(
     print_note(f"  ESC_DATABASE_URL={_without_password(there.database)}\n  ESC_BLOB_URL={blobs_there}")
 
 
-def _copy(source: str, target: str, blobs_from: str, blobs_to: str) -> tuple[int | None, dict[str, int]]:
-    """Copy files and rows; gives how many files, None if they stay, and how many rows each table has."""
+@contextmanager
+def _ended_by_signals() -> Iterator[Callable[[], None]]:
+    """Have SIGTERM, and SIGHUP of a terminal that is closed, end the block as Ctrl-C does, so that it tidies up.
+
+    Gives what has all three ignored: whoever asks twice breaks off no tidying.
+    """
+    before = {number: signal.getsignal(number) for number in ENDING}
+
+    def ignore() -> None:
+        for number in ENDING:
+            signal.signal(number, signal.SIG_IGN)
+
+    def end(number: int, _: object) -> None:
+        ignore()
+        print_note(f"Nothing is copied: ended by {signal.Signals(number).name}.")
+        sys.exit(128 + number)
+
+    for number, handler in before.items():
+        # Under `nohup` SIGHUP is ignored.
+        if handler is not signal.SIG_IGN:
+            signal.signal(number, end)
+    try:
+        yield ignore
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _copy(
+    source: str, target: str, blobs_from: str, blobs_to: str, committing: Callable[[], None]
+) -> tuple[int | None, dict[str, int]]:
+    """Copy files and rows; gives how many files, None if they stay, and how many rows each table has.
+
+    `committing` is called when from now on nothing may be taken back.
+    """
     from service import queue
     from service.store.blobs import Blobs
     from service.store.copying import copy_rows, exclusive_snapshot
@@ -99,7 +136,7 @@ def _copy(source: str, target: str, blobs_from: str, blobs_to: str) -> tuple[int
         queue.migrate(target)
         waiting = queue.Queue(target)
         stack.callback(waiting.close)
-        return files, copy_rows(reading, engine, waiting.enqueue)
+        return files, copy_rows(reading, engine, waiting.enqueue, committing)
 
 
 @contextmanager
@@ -139,11 +176,16 @@ def _copy_files(here: Blobs, there: Blobs, url: str) -> Iterator[int]:
     """Copy every file, and give how many; if what comes after fails, the copies are deleted again."""
     from service.store.copying import CannotCopy
 
-    if next(there.paths(), None) is not None:
-        raise CannotCopy(f"{url} has files already: name an empty folder or part of a bucket with --blobs-to.")
+    paths, before = [*here.paths()], {*there.paths()}
+    # A copy that was killed left some of them, which are copied again.
+    if foreign := sorted(before.difference(paths)):
+        raise CannotCopy(
+            f"{url} has files that FROM has not ({len(foreign)}, such as {foreign[0]}): name an empty folder or part "
+            "of a bucket with --blobs-to."
+        )
     copied: list[str] = []
     try:
-        for path in here.paths():
+        for path in paths:
             data = here.get(path)
             if data is None:
                 raise CannotCopy(f"{path} vanished while it was copied: something still deletes files of the source.")
@@ -151,7 +193,7 @@ def _copy_files(here: Blobs, there: Blobs, url: str) -> Iterator[int]:
             there.put(path, data)
         yield len(copied)
     except BaseException:
-        there.delete(copied)
+        there.delete([path for path in copied if path not in before])
         raise
 
 

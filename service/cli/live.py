@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from service.cli.answers import outcome_text
-from service.cli.arguments import DEFAULT_URL, ApiKey, Url, load_settings, parse_by_camera
+from service.cli.arguments import DEFAULT_URL, ApiKey, Url, load_settings, parse_by_camera, require_cameras
 from service.cli.printing import USAGE, OngoingTrouble, fail, print_note
 from service.cli.service_client import load_venue
 
@@ -32,6 +32,8 @@ LOOK_AGAIN_S = 2.0
 # For the last report when it is stopped; a service that hangs is not waited for.
 LAST_REPORT_S = 2.0
 HIGHEST_RATE = 1000
+# What ran before a restart counts as running for five seconds after its last report.
+OTHERS_AFTER_S, OTHERS_AGAIN_S = 6.0, 30.0
 MULTICAST = "multicast"
 
 
@@ -85,6 +87,17 @@ def live(
     freed: Annotated[
         list[str] | None, typer.Option("--freed", metavar="HOST:PORT", help="Send FreeD D1 packets there.")
     ] = None,
+    zoom: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--zoom",
+            metavar="CAMERA=COUNT",
+            help="Send this count as the zoom of a camera by FreeD, 0 to 16777215: one of the renderer's lens file.",
+        ),
+    ] = None,
+    focus: Annotated[
+        list[str] | None, typer.Option("--focus", metavar="CAMERA=COUNT", help="The same as its focus.")
+    ] = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print a line of JSON for each sample on standard output.")
     ] = False,
@@ -119,23 +132,24 @@ def live(
     if recover and (Path(venue).is_file() or not addresses):
         fail("--recover has the service calibrate a venue of its own whose cameras are tracked in streams", USAGE)
     beat = _parse_rate(rate)
+    zooms, focuses = _parse_counts(zoom or [], "--zoom"), _parse_counts(focus or [], "--focus")
+    if (zooms or focuses) and not freed:
+        fail("--zoom and --focus are sent by FreeD alone: add --freed HOST:PORT", USAGE)
     from service.live.destinations import UdpSocket
 
     if not (opentrackio or freed or as_json):
         opentrackio = [MULTICAST]
-    words = [f"opentrackio {address}" for address in opentrackio or []]
-    words += [*(f"freed {address}" for address in freed or []), *(["json"] if as_json else [])]
     with UdpSocket(interface) as socket:
-        destinations = _destinations(socket, opentrackio or [], freed or [], as_json=as_json)
+        destinations = _destinations(socket, opentrackio or [], freed or [], zooms, focuses, as_json=as_json)
         stored = load_venue(venue, url, api_key)
+        require_cameras(stored, [*zooms, *focuses])
         service = None if Path(venue).is_file() else (url, api_key)
-        _send(stored, destinations, words, beat, addresses, follow_every, predict / 1000, service, recover=recover)
+        _send(stored, destinations, beat, addresses, follow_every, predict / 1000, service, recover=recover)
 
 
 def _send(
     stored: Venue,
-    destinations: Sequence[Destination],
-    words: Sequence[str],
+    destinations: Mapping[str, Destination],
     beat: Fraction,
     addresses: Mapping[str, str],
     every: int,
@@ -144,7 +158,7 @@ def _send(
     *,
     recover: bool,
 ) -> None:
-    """Send poses until stopped. `words`: of the destinations; `service`: its address and key, where there is one.
+    """Send poses to destinations, by their names, until stopped. `service`: its address and key, where there is one.
 
     It is asked for new poses, told how those that are sent are doing, and with `recover` asked for calibrations.
     """
@@ -153,15 +167,27 @@ def _send(
     from service.live.reports import LiveReporter
     from service.live.stored_poses import StoredPoses, send_stored_poses
 
-    poses, stop, trouble = StoredPoses(stored), threading.Event(), OngoingTrouble()
-    sender = PoseSender(destinations, lambda error: trouble.say(f"Not sent: {error}"))
-    reporter = LiveReporter(poses, addresses, words)
+    poses, stop, unread = StoredPoses(stored), threading.Event(), threading.Event()
+    troubles = {name: OngoingTrouble() for name in destinations}
+
+    def tell(name: str, error: OSError | None) -> None:
+        if error is None:
+            troubles[name].over(f"Sent to {name} again")
+        else:
+            troubles[name].say(f"Not sent to {name}: {error}")
+
+    def end_unread() -> None:
+        unread.set()
+        stop.set()
+
+    sender = PoseSender(destinations, tell, end_unread)
+    reporter = LiveReporter(poses, addresses, [*destinations])
     streams = TrackedStreams.of(stored, addresses, every, ahead_s, sender, reporter.sent)
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: stop.set())
     beside = []
     if service is not None:
-        threading.Thread(target=_ask_for_poses, args=(poses, streams, *service, stop), daemon=True).start()
+        threading.Thread(target=_ask_for_poses, args=(poses, streams, reporter, *service, stop), daemon=True).start()
         beside = [threading.Thread(target=_report, args=(reporter, *service, stop), daemon=True)]
         if recover:
             threading.Thread(target=_recover, args=(stored.id, streams, *service, stop), daemon=True).start()
@@ -174,7 +200,9 @@ def _send(
     streams.stop()
     for thread in beside:
         thread.join(LAST_REPORT_S)
-    print_note("Stopped.")
+    # A filter whose reader has gone says nothing.
+    if not unread.is_set():
+        print_note("Stopped.")
 
 
 def _report(reporter: LiveReporter, url: str, api_key: str | None, stop: threading.Event) -> None:
@@ -192,21 +220,33 @@ def _report(reporter: LiveReporter, url: str, api_key: str | None, stop: threadi
 
 
 def _ask_for_poses(
-    poses: StoredPoses, streams: TrackedStreams, url: str, api_key: str | None, stop: threading.Event
+    poses: StoredPoses,
+    streams: TrackedStreams,
+    reporter: LiveReporter,
+    url: str,
+    api_key: str | None,
+    stop: threading.Event,
 ) -> None:
-    """Ask for the venue's poses again and again; where the service does not answer, the last ones stay in use."""
+    """Ask for the venue's poses again and again; where the service does not answer, the last ones stay in use.
+
+    Now and then it asks as well who else sends poses of the venue.
+    """
     import time
 
     import httpx
 
     from service.client import Client, NotUnderstood, Refused
 
-    trouble, venue = OngoingTrouble(), poses.venue.id
+    trouble, company, venue = OngoingTrouble(), OngoingTrouble(), poses.venue.id
+    look_for_others_s = time.monotonic() + OTHERS_AFTER_S
     with Client(url, api_key) as client:
         while not stop.wait(LOOK_AGAIN_S):
             try:
                 now = client.venue(venue)
                 new = poses.replace(now, time.monotonic())
+                if time.monotonic() >= look_for_others_s:
+                    look_for_others_s = time.monotonic() + OTHERS_AGAIN_S
+                    _print_company(company, reporter.running_others(client.live(venue)))
             except (Refused, NotUnderstood, httpx.HTTPError) as error:
                 trouble.say(f"Poses stay as they are, the service does not tell them: {error}")
                 continue
@@ -214,6 +254,15 @@ def _ask_for_poses(
             if new:
                 streams.anchor([camera for camera in now.cameras if camera.id in new])
                 print_note(f"New pose or lens: {', '.join(new)}")
+
+
+def _print_company(company: OngoingTrouble, others: Sequence[str]) -> None:
+    if others:
+        company.say(
+            f"Also sending poses of this venue: {', '.join(others)}. Each is watched by itself: end one of them"
+        )
+    else:
+        company.over("No other process sends poses of this venue any more")
 
 
 def _recover(venue: str, streams: TrackedStreams, url: str, api_key: str | None, stop: threading.Event) -> None:
@@ -249,19 +298,31 @@ class _RecoveryNotes:
 
 
 def _destinations(
-    socket: UdpSocket, opentrackio: Sequence[str], freed: Sequence[str], *, as_json: bool
-) -> list[Destination]:
+    socket: UdpSocket,
+    opentrackio: Sequence[str],
+    freed: Sequence[str],
+    zooms: Mapping[str, int],
+    focuses: Mapping[str, int],
+    *,
+    as_json: bool,
+) -> dict[str, Destination]:
+    """Return the destinations by their names, which reports and notes have."""
+    from service.formats.freed import EncoderCounts
     from service.live.destinations import OPENTRACKIO_PORT, FreeD, JsonLines, OpenTrackIO
 
-    found: list[Destination] = [
-        OpenTrackIO(socket)
+    found: dict[str, Destination] = {
+        f"opentrackio {address}": OpenTrackIO(socket)
         if address == MULTICAST
         else OpenTrackIO(socket, *_parse_address(address, "--opentrackio", OPENTRACKIO_PORT))
         for address in opentrackio
-    ]
+    }
     axes = load_settings().freed_axes if freed else ""
-    found += [FreeD(socket, *_parse_address(address, "--freed", None), axes) for address in freed]
-    return [*found, JsonLines(sys.stdout)] if as_json else found
+    counts = {
+        camera: EncoderCounts(zooms.get(camera, 0), focuses.get(camera, 0)) for camera in zooms.keys() | focuses.keys()
+    }
+    for address in freed:
+        found[f"freed {address}"] = FreeD(socket, *_parse_address(address, "--freed", None), axes, counts)
+    return found | {"json": JsonLines(sys.stdout)} if as_json else found
 
 
 def _parse_address(text: str, option: str, usual_port: int | None) -> tuple[str, int]:
@@ -271,6 +332,16 @@ def _parse_address(text: str, option: str, usual_port: int | None) -> tuple[str,
     if match is None or port is None or not 0 < int(port) < 65536:
         fail(f"{option} {text}: expected HOST:PORT, such as 10.1.0.20:40000", USAGE)
     return match["six"] or match["host"], int(port)
+
+
+def _parse_counts(arguments: Sequence[str], option: str) -> dict[str, int]:
+    from service.formats.freed import LARGEST_COUNT
+
+    counts = parse_by_camera(arguments, f"CAMERA=COUNT of {option}, for instance left=32768")
+    for camera, count in counts.items():
+        if not (count.isascii() and count.isdecimal() and int(count[:9]) <= LARGEST_COUNT and len(count) < 9):
+            fail(f"{option} {camera}={count}: expected a count from 0 to {LARGEST_COUNT}", USAGE)
+    return {camera: int(count) for camera, count in counts.items()}
 
 
 def _parse_rate(text: str) -> Fraction:

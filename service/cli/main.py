@@ -5,6 +5,7 @@ What a command needs is imported where it runs: the client's commands start in a
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Sequence
 from typing import Annotated, Any
@@ -37,9 +38,27 @@ def main() -> None:
     child_process.end_with_parent()
     try:
         app_of(sys.argv[1:])()
+    except BrokenPipeError:
+        # Nobody reads any more, as after `| head -2`.
+        pass
     except OSError as error:
         why = error.strerror or str(error)
         fail(f"{error.filename}: {why}" if error.filename else why, FAILED)
+    finally:
+        _flush_output()
+
+
+def _flush_output() -> None:
+    """Write what was printed, in silence where nobody reads it any more, as after `| head -2`.
+
+    The interpreter, which does it otherwise, prints a traceback then and makes the exit code 120.
+    """
+    try:
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except BrokenPipeError:
+        # What is still to be written goes nowhere.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def app_of(arguments: Sequence[str]) -> typer.Typer:

@@ -48,6 +48,7 @@ def worker(
     try:
         settings = load_settings(data=data, worker_name=name)
         with report_database_errors(settings, with_worker=True):
+            _check_database_place(settings)
             supervisor.run(settings)
     except AlreadyRunning as error:
         fail(str(error), USAGE)
@@ -59,9 +60,17 @@ def _serve(settings: Settings, *, with_worker: bool) -> None:
 
     try:
         with report_database_errors(settings, with_worker=with_worker):
+            _check_database_place(settings)
             serving.serve(settings, with_worker=with_worker)
     except (serving.CannotListen, AlreadyRunning) as error:
         fail(str(error), USAGE)
+
+
+def _check_database_place(settings: Settings) -> None:
+    from service.store.database import require_local_file
+
+    if not settings.sqlite_on_network:
+        require_local_file(settings.home_database_url)
 
 
 @contextmanager

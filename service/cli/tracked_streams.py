@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Self
 
-from service.cli.printing import USAGE, OngoingTrouble, fail, print_note
+from service.cli.arguments import require_cameras
+from service.cli.printing import OngoingTrouble, print_note
 from service.formats.lens import NumberedCamera
 from service.live.reports import SILENT_S, SentPose
 
@@ -48,9 +49,7 @@ class TrackedStreams:
         their pictures; `sent` is told of each.
         """
         found = cls(venue, sender, sent)
-        unknown = [camera for camera in addresses if camera not in found.numbers]
-        if unknown:
-            fail(f"The venue has no camera {', '.join(unknown)}; it has {', '.join(found.numbers)}", USAGE)
+        require_cameras(venue, addresses)
         if addresses:
             from service.cli.local_engine import engine_settings
 

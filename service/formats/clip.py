@@ -55,6 +55,7 @@ class ClipPoses:
             opentrackio.write(shot)
         freed.write(shots, freed_axes)
         self._axes = freed_axes
+        self._angles = opentrackio.SteadyAngles()
         self._number = 0
         with ExitStack() as opening:
             self._samples, self._packets = (
@@ -69,7 +70,7 @@ class ClipPoses:
         """The next frame of a clip of so many a second, its cameras in the order of the venue."""
         for camera in cameras:
             frame = opentrackio.Frame(self._number, rate, camera.status)
-            self._samples.write(opentrackio.write_frame(camera.shot, frame))
+            self._samples.write(opentrackio.write_frame(camera.shot, frame, self._angles))
             self._rows.writerow(self._row(camera))
         self._packets.write(freed.write([camera.shot for camera in cameras], self._axes))
         self._number += 1

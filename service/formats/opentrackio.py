@@ -12,7 +12,7 @@ from __future__ import annotations
 import json
 import math
 import uuid
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
@@ -54,12 +54,32 @@ class Frame:
     status: str
 
 
+@dataclass(frozen=True)
+class SteadyAngles:
+    """Pan, tilt and roll of cameras from sample to sample, in degrees, without jumps at 180 degrees.
+
+    Renderers fill in between samples: between 179.99 and -179.99 they would swing once round.
+    """
+
+    _last: dict[str, tuple[float, float, float]] = field(default_factory=dict)
+
+    def of(self, shot: NumberedCamera) -> tuple[float, float, float]:
+        """Return the angles of the next sample of a camera, each as near to those of the one before as turns allow."""
+        angles = _pan_tilt_roll_deg(shot)
+        last = self._last.get(shot.id, angles)
+        pan, tilt, roll = (
+            angle + 360 * round((before - angle) / 360) for angle, before in zip(angles, last, strict=True)
+        )
+        self._last[shot.id] = pan, tilt, roll
+        return pan, tilt, roll
+
+
 def write(shot: NumberedCamera) -> bytes:
     """One sample of a camera that stands still: it names a pose, not a moment of a stream."""
-    return (json.dumps(_with_sample_id(_sample(shot)), indent=2) + "\n").encode()
+    return (json.dumps(_with_sample_id(_sample(shot, _pan_tilt_roll_deg(shot))), indent=2) + "\n").encode()
 
 
-def write_frame(shot: NumberedCamera, frame: Frame) -> bytes:
+def write_frame(shot: NumberedCamera, frame: Frame, angles: SteadyAngles) -> bytes:
     """One sample of a clip, a line of JSON. Its timecode counts from 00:00:00:00 at the first frame, without drops.
 
     The samples travel beside the video, whose frames they are of: nobody knows by a clock when those were taken.
@@ -73,10 +93,10 @@ def write_frame(shot: NumberedCamera, frame: Frame) -> bytes:
             "timecode": _timecode(frame),
         },
     }
-    return (json.dumps(_with_sample_id(_sample(shot) | moment), separators=(",", ":")) + "\n").encode()
+    return (json.dumps(_with_sample_id(_sample(shot, angles.of(shot)) | moment), separators=(",", ":")) + "\n").encode()
 
 
-def write_moment(shot: NumberedCamera, moment: SampleTime) -> bytes:
+def write_moment(shot: NumberedCamera, moment: SampleTime, angles: SteadyAngles) -> bytes:
     """One sample of a stream, compact JSON. Its timestamp is UTC in seconds since 1970 by the sender's clock."""
     seconds, nanoseconds = divmod(moment.unix_ns, 1_000_000_000)
     timing = {
@@ -88,15 +108,16 @@ def write_moment(shot: NumberedCamera, moment: SampleTime) -> bytes:
             "sequenceNumber": moment.number % SEQUENCE_NUMBERS,
         },
     }
-    return json.dumps(_with_sample_id(_sample(shot) | timing), separators=(",", ":")).encode()
+    sample = _sample(shot, angles.of(shot)) | timing
+    return json.dumps(_with_sample_id(sample), separators=(",", ":")).encode()
 
 
-def _sample(shot: NumberedCamera) -> dict[str, Any]:
+def _sample(shot: NumberedCamera, angles: tuple[float, float, float]) -> dict[str, Any]:
     return {
         "protocol": {"name": "OpenTrackIO", "version": [1, 0, 1]},
         "static": {"camera": _sensor(shot)},
         "lens": _lens(shot),
-        "transforms": [_transform(shot)],
+        "transforms": [_transform(shot, angles)],
         "sourceId": uuid.uuid5(SOURCES, shot.id).urn,
         "sourceNumber": shot.number,
     }
@@ -180,15 +201,20 @@ def _lens(shot: NumberedCamera) -> dict[str, Any]:
     }
 
 
-def _transform(shot: NumberedCamera) -> dict[str, Any]:
-    b = product(transposed(shot.rotation), transposed(AHEAD_IS_Y))
-    pan, tilt, roll = pan_tilt_roll(b)
+def _transform(shot: NumberedCamera, angles: tuple[float, float, float]) -> dict[str, Any]:
+    pan, tilt, roll = angles
     x, y, z = shot.camera.pose.position
     return {
         "id": "camera",
         "translation": {"x": x, "y": y, "z": z},
-        "rotation": {"pan": math.degrees(pan), "tilt": math.degrees(tilt), "roll": math.degrees(roll)},
+        "rotation": {"pan": pan, "tilt": tilt, "roll": roll},
     }
+
+
+def _pan_tilt_roll_deg(shot: NumberedCamera) -> tuple[float, float, float]:
+    b = product(transposed(shot.rotation), transposed(AHEAD_IS_Y))
+    pan, tilt, roll = pan_tilt_roll(b)
+    return math.degrees(pan), math.degrees(tilt), math.degrees(roll)
 
 
 def pan_tilt_roll(b: list[list[float]]) -> tuple[float, float, float]:

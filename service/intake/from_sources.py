@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import hashlib
+from collections.abc import Callable, Mapping, Sequence
 
 from service.intake.snapshots import Snapshots
 from service.intake.submit import Intake, frame_paths
@@ -64,8 +65,8 @@ class FromSources:
         venue, credentials = found
         taken = self._snapshots.take_of_all(venue.cameras, credentials, frames, spacing_s, within_s)
         fetched()
-        counts = {camera: len(several) for camera, several in taken.items()}
-        submission = _submission(venue, options, key, origin, counts)
+        hashes = {camera: [hashlib.sha256(frame).hexdigest() for frame in several] for camera, several in taken.items()}
+        submission = _submission(venue, options, key, origin, hashes)
 
         def store() -> None:
             for camera, paths in submission.frames.items():
@@ -86,14 +87,14 @@ class FromSources:
 
 
 def _submission(
-    venue: Venue, options: Options, key: str | None, origin: Origin, counts: Mapping[str, int]
+    venue: Venue, options: Options, key: str | None, origin: Origin, hashes: Mapping[str, Sequence[str]]
 ) -> Submission:
     job_id = new_id()
     return Submission(
         job_id=job_id,
         venue=venue,
         options=seeded(options),
-        frames=frame_paths(job_id, counts),
+        frames=frame_paths(job_id, hashes),
         origin=origin,
         content_hash=fetched_hash(options),
         idempotency_key=key,

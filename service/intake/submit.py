@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from datetime import timedelta
 
@@ -13,7 +13,7 @@ from service.store.blobs import Blobs
 from service.store.database import DATABASE_OUTAGES
 from service.store.expiry import ExpiryRepository
 from service.store.jobs.attempts import Enqueue
-from service.store.jobs.files import frame_folder
+from service.store.jobs.files import frame_folder, frame_path
 from service.store.jobs.submission import Submission, SubmissionRefused, SubmissionRepository
 from service.store.jobs.task import Origin
 
@@ -71,9 +71,9 @@ class Intake:
             self._expiry.forget_leftovers([folder])
 
 
-def frame_paths(job_id: str, counts: Mapping[str, int]) -> dict[str, list[str]]:
-    """Where the frames of a job will lie, by camera."""
+def frame_paths(job_id: str, hashes: Mapping[str, Sequence[str]]) -> dict[str, list[str]]:
+    """Return where the frames of a job will lie, by camera, from the SHA-256 of each."""
     return {
-        camera: [f"{frame_folder(job_id)}/{camera}/{number}" for number in range(count)]
-        for camera, count in counts.items()
+        camera: [frame_path(job_id, camera, number, sha256) for number, sha256 in enumerate(several)]
+        for camera, several in hashes.items()
     }

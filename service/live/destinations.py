@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import json
+import select
 import socket
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from fractions import Fraction
+from io import TextIOWrapper
 from typing import IO, Protocol, Self
 
 from service.formats import freed, opentrackio
 from service.formats.lens import NumberedCamera
+from service.live.host_lookup import HostLookup
 from service.live.packets import datagrams
 from service.schemas.live import LiveClock
 
@@ -75,11 +78,17 @@ class UdpSocket:
 
     def __init__(self, interface: str | None = None) -> None:
         self._sockets: dict[int, socket.socket] = {}
+        self._lookups: dict[tuple[str, int], HostLookup] = {}
         self._interface = interface
 
     def send(self, datagram: bytes, host: str, port: int) -> None:
-        """Send a datagram. Raises `OSError`."""
-        family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
+        """Send a datagram; none goes out before the host was looked up. Raises `OSError`."""
+        if (host, port) not in self._lookups:
+            self._lookups[host, port] = HostLookup(host, port)
+        found = self._lookups[host, port].address()
+        if found is None:
+            return
+        family, address = found
         if family not in self._sockets:
             self._sockets[family] = self._opened(family)
         self._sockets[family].sendto(datagram, address)
@@ -88,6 +97,8 @@ class UdpSocket:
         return self
 
     def __exit__(self, *_: object) -> None:
+        for lookup in self._lookups.values():
+            lookup.close()
         for opened in self._sockets.values():
             opened.close()
 
@@ -107,12 +118,13 @@ class OpenTrackIO:
     socket: UdpSocket
     host: str | None = None
     port: int = OPENTRACKIO_PORT
+    _angles: opentrackio.SteadyAngles = field(default_factory=opentrackio.SteadyAngles, init=False)
 
     def send(self, samples: Sequence[Sample]) -> None:
         """Send a sample of each camera, in as many datagrams as it takes."""
         for sample in samples:
             host = self.host or OPENTRACKIO_GROUP.format(number=sample.shot.number)
-            content = opentrackio.write_moment(sample.shot, sample.moment)
+            content = opentrackio.write_moment(sample.shot, sample.moment, self._angles)
             for datagram in datagrams(content, sample.moment.number):
                 self.socket.send(datagram, host, self.port)
 
@@ -125,21 +137,22 @@ class FreeD:
     host: str
     port: int
     axes: str
+    counts: Mapping[str, freed.EncoderCounts] | None = None
 
     def send(self, samples: Sequence[Sample]) -> None:
         """Send a packet of each camera."""
         for sample in samples:
-            self.socket.send(freed.write([sample.shot], self.axes), self.host, self.port)
+            self.socket.send(freed.write([sample.shot], self.axes, self.counts), self.host, self.port)
 
 
 @dataclass(frozen=True)
 class JsonLines:
-    """A line of JSON for each camera, on a stream of text."""
+    """A line of JSON for each camera, on a stream of text, whose reader nobody waits for."""
 
     stream: IO[str]
 
     def send(self, samples: Sequence[Sample]) -> None:
-        """Write a line for each camera."""
+        """Write a line for each camera. Raises `BrokenPipeError` where nobody reads any more."""
         for sample in samples:
             moment, camera = sample.moment, sample.shot.camera
             line: dict[str, object] = {
@@ -152,19 +165,32 @@ class JsonLines:
             }
             if sample.tracked is not None:
                 line |= sample.tracked.to_json()
-            print(json.dumps(line, separators=(",", ":")), file=self.stream)
-        self.stream.flush()
+            if not self._has_room():
+                raise OSError("the program that reads the lines does not keep up")
+            # Line by line: one fits into what a pipe with any room takes at once, all of a moment need not.
+            print(json.dumps(line, separators=(",", ":")), file=self.stream, flush=True)
+
+    def _has_room(self) -> bool:
+        return not isinstance(self.stream, TextIOWrapper) or self.stream in select.select([], [self.stream], [], 0)[1]
 
 
 class PoseSender:
-    """Sends samples to all `destinations`, those of each camera numbered from 0. Several threads may call it.
+    """Sends samples to all `destinations`, which have names, those of each camera numbered from 0.
 
-    What the network does not take is told to `failed`, and the next samples are sent all the same.
+    Several threads may call it. `told` gets the name of each destination with the error where the network does not take
+    samples, or None where it does; the next samples are sent all the same. A destination that nobody reads any more is
+    left out, and once none remains `ended` is called.
     """
 
-    def __init__(self, destinations: Sequence[Destination], failed: Callable[[OSError], None]) -> None:
-        self._destinations = destinations
-        self._failed = failed
+    def __init__(
+        self,
+        destinations: Mapping[str, Destination],
+        told: Callable[[str, OSError | None], None],
+        ended: Callable[[], None],
+    ) -> None:
+        self._destinations = dict(destinations)
+        self._told = told
+        self._ended = ended
         self._numbers = Counter[str]()
         self._lock = threading.Lock()
 
@@ -183,8 +209,19 @@ class PoseSender:
                 for shot in shots
             ]
             self._numbers.update(shot.id for shot in shots)
-            for destination in self._destinations:
-                try:
-                    destination.send(samples)
-                except OSError as error:
-                    self._failed(error)
+            for name in [*self._destinations]:
+                self._send_to(name, samples)
+
+    def _send_to(self, name: str, samples: Sequence[Sample]) -> None:
+        try:
+            self._destinations[name].send(samples)
+        except BrokenPipeError as error:
+            del self._destinations[name]
+            if self._destinations:
+                self._told(name, error)
+            else:
+                self._ended()
+        except OSError as error:
+            self._told(name, error)
+        else:
+            self._told(name, None)

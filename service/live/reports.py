@@ -22,7 +22,7 @@ from service.client import Client, NotUnderstood, Refused
 from service.live.destinations import Tracked
 from service.live.stored_poses import StoredPoses
 from service.schemas.geometry import Pose, PoseIn
-from service.schemas.live import LatencyMs, LiveCameraIn, LiveReport, LiveSigma, LiveStatus
+from service.schemas.live import LatencyMs, LiveCameraIn, LiveReport, LiveSigma, LiveState, LiveStatus
 from service.schemas.venue import Camera
 
 INTERVAL_S = 0.5
@@ -108,6 +108,14 @@ class LiveReporter:
         self._started_at = datetime.now(UTC)
         self._tracked = {camera: _TrackedCamera() for camera in streams}
         self._lock = threading.Lock()
+
+    def running_others(self, state: LiveState) -> list[str]:
+        """Return host and pid of other processes that report of the venue at the moment, by what the service knows."""
+        me = socket.gethostname(), os.getpid(), self._started_at
+        running = [(one.host, one.pid, one.started_at) for one in state.others if one.running]
+        if state.running:
+            running.append((state.host or "", state.pid, state.started_at or self._started_at))
+        return [f"{host} (process {pid})" for host, pid, started_at in running if (host, pid, started_at) != me]
 
     def sent(self, pose: SentPose) -> None:
         """Count a tracked pose that has just been sent."""

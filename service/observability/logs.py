@@ -9,11 +9,13 @@ from typing import TextIO, cast
 
 import structlog
 
+from service.observability.outage_lines import OutageLines
 from service.settings import Settings
 
 
 def configure(settings: Settings) -> None:
     """Send structlog's and the standard library's records to stderr in one form."""
+    outages = OutageLines()
     shared: list[structlog.typing.Processor] = [
         structlog.contextvars.merge_contextvars,
         structlog.processors.add_log_level,
@@ -29,7 +31,7 @@ def configure(settings: Settings) -> None:
     )
     level = logging.getLevelName(settings.log_level.upper())
     structlog.configure(
-        processors=[*shared, *last],
+        processors=[*shared, outages.structured, *last],
         wrapper_class=structlog.make_filtering_bound_logger(level),
         logger_factory=structlog.WriteLoggerFactory(cast(TextIO, _AsFarAsItTakes(sys.stderr))),
     )
@@ -40,6 +42,7 @@ def configure(settings: Settings) -> None:
             processors=[structlog.stdlib.ProcessorFormatter.remove_processors_meta, *last],
         )
     )
+    handler.addFilter(outages.filter)
     logging.basicConfig(handlers=[handler], level=max(level, logging.WARNING), force=True)
     # The engine of the queue brings a console handler of its own.
     logging.getLogger("dbos").handlers = [logging.NullHandler()]

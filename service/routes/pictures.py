@@ -15,6 +15,7 @@ from service.schemas.file_kinds import PNG_START
 from service.schemas.job import Job
 from service.schemas.names import ID_PATTERN
 from service.schemas.problems import Problem
+from service.store.blobs import DamagedBlob
 from service.store.jobs.files import picture_file
 from service.store.jobs.queries import Pictures
 
@@ -97,7 +98,7 @@ async def _picture(context: Context, job: Job, name: str) -> Response:
 def _why_deleted(pictures: Pictures, keep_days: float) -> str:
     if pictures.deleted:
         return f"Pictures are deleted {keep_days:g} days after the end of their job; the job and its numbers stay."
-    return "Its file, or the frames to draw it of, are gone from the store, and not by the service."
+    return "Its file, or the frames to draw it of, are gone from the store or damaged, and not by the service."
 
 
 for each in PICTURES:
@@ -113,7 +114,11 @@ for each in PICTURES:
 def job_frame(job: ExistingJob, number: Annotated[int, Path(ge=0, le=10_000)], context: InContext) -> Response:
     """Return a frame or photo of a job as it came. `frames` of the job has the addresses of all."""
     path = context.jobs.frame(job.id, number)
-    data = None if path is None else context.blobs.get(path)
+    try:
+        data = None if path is None else context.blobs.read(path)
+    except DamagedBlob as damage:
+        detail = f"The frame was damaged in the store, and not by the service: {damage}."
+        raise Problem("frames-deleted", detail, job=job.id) from None
     if data is None and job.frames:
         raise Problem("picture-not-found", "The job has no frame of this number.", job=job.id)
     if data is None:

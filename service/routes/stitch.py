@@ -11,6 +11,7 @@ from starlette.concurrency import run_in_threadpool
 
 from service.api import etags
 from service.api.context import Context, InContext
+from service.api.programs.drawings import drawable_frame
 from service.routes.contract.documented import BINARY, header_docs, needs_scope, problem_responses
 from service.routes.contract.guarded import Guarded
 from service.routes.contract.tagged import TAGGED, IfNoneMatch, tagged_response
@@ -20,7 +21,6 @@ from service.schemas.problems import Problem
 from service.schemas.programs.stitching import StitchRequest
 from service.schemas.venue import Venue
 from service.schemas.view import FieldOfView, Height, Horizon, Pan, ViewChoice, Width
-from service.store.jobs.files import source_file
 
 router = APIRouter(prefix="/venues", tags=["venues"], route_class=Guarded)
 # Of the files of a package: whoever has one of another edition fetches it anew.
@@ -135,7 +135,7 @@ def _frames(context: Context, venue: Venue, job: str | None) -> dict[str, bytes]
     if drawable is not None and pictures is not None:
         for camera in drawable.venue.cameras:
             path = drawable.frames.get(camera.id)
-            frame = path and (context.blobs.get(path) or context.blobs.get(source_file(pictures.folder, camera.id)))
+            frame = path and drawable_frame(context.blobs, path, pictures.folder, camera.id)
             if frame and sizes.get(camera.id) == camera.image_size:
                 frames[camera.id] = frame
     if frames.keys() != sizes.keys():

@@ -154,6 +154,16 @@ class LiveReport(Schema):
         return self
 
 
+class LiveSender(Schema):
+    """A process that sends a venue's live poses beside the one that reported last."""
+
+    host: str
+    pid: int | None = None
+    started_at: datetime
+    reported_at: datetime = Field(description="When the service got its last report.")
+    running: bool = Field(description="Whether that is at most five seconds ago.")
+
+
 class LiveState(Schema):
     """The newest report of the process that sends a venue's live poses; without one, all but `cameras` is null."""
 
@@ -165,6 +175,9 @@ class LiveState(Schema):
     destinations: list[str] = Field([])
     stopped: bool = Field(False, description="Whether the process was told to end.")
     cameras: list[LiveCamera] = Field([])
+    others: list[LiveSender] = Field(
+        [], description="Other processes that report of the venue, or did so until they were missed: run one."
+    )
 
 
 class LiveMinuteCamera(Schema):

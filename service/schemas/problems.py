@@ -239,11 +239,6 @@ REFUSAL_REASONS: dict[str, RefusalReason] = {
 }
 
 
-def first_line(error: Exception) -> str:
-    """What a client is told of it: errors of databases and buckets go on with what was tried."""
-    return (str(error).splitlines() or [""])[0][:300] or type(error).__name__
-
-
 class Problem(Exception):  # noqa: N818  (the term of RFC 9457)
     """An answer that is not the one hoped for. `parts` are members of their own: the camera, expected and got."""
 

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
+import re
 import shutil
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from datetime import timedelta
+from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Concatenate, ParamSpec, TypeVar
 from urllib.parse import unquote, urlparse
 
 import obstore
-from obstore.exceptions import BaseError
+import structlog
+from obstore.exceptions import BaseError, PermissionDeniedError, UnauthenticatedError
 from obstore.store import LocalStore, ObjectStore, from_url
 
 from service.secret_files import bucket_credentials
@@ -25,20 +30,45 @@ class BlobFolderUnavailable(Exception):  # noqa: N818
     """The folder of the blobs cannot be written or read; the message is that of the operating system."""
 
 
+class DamagedBlob(Exception):  # noqa: N818
+    """An object is empty, or its hash is not the one in its name; the message says which."""
+
+
 # What is raised while a bucket is away, or a disk full: trying again later can help.
 BLOB_OUTAGES = (BaseError, BlobFolderUnavailable)
 # For one answer of a bucket to one request.
 ANSWER_S = 30.0
 TRUE = ("1", "true", "on", "yes", "y")
+# Half an object may be the network's fault: it is read again, after so long each.
+AGAIN_S = (0.2, 1.0)
+# The hash at the end of an object's path, by which it is known again: SHA-256. Objects of older versions have none.
+HASH = re.compile(r"\.([0-9a-f]{64})$")
+log = structlog.get_logger()
+Arguments = ParamSpec("Arguments")
+Returned = TypeVar("Returned")
 
 
-@contextmanager
-def _raising_blob_outages() -> Iterator[None]:
-    """Raise `BlobFolderUnavailable` for an `OSError`, which anything else that opens files may raise as well."""
-    try:
-        yield
-    except OSError as error:
-        raise BlobFolderUnavailable(str(error)) from error
+def _raising_blob_outages(
+    method: Callable[Concatenate[Blobs, Arguments], Returned],
+) -> Callable[Concatenate[Blobs, Arguments], Returned]:
+    """Have a method raise `BlobFolderUnavailable` for what the file system says, by Python or by obstore.
+
+    An `OSError` may be raised by anything else that opens files as well.
+    """
+
+    @wraps(method)
+    def raising(blobs: Blobs, /, *arguments: Arguments.args, **more: Arguments.kwargs) -> Returned:
+        try:
+            return method(blobs, *arguments, **more)
+        except OSError as error:
+            raise BlobFolderUnavailable(str(error)) from error
+        except BaseError as error:
+            if blobs.is_folder:
+                # What was tried stands on the lines below.
+                raise BlobFolderUnavailable(str(error).partition("\n")[0]) from error
+            raise
+
+    return raising
 
 
 class Blobs:
@@ -63,14 +93,19 @@ class Blobs:
             )
         )
 
-    @_raising_blob_outages()
+    @property
+    def is_folder(self) -> bool:
+        """Whether it is a folder, not a bucket."""
+        return self._folder is not None
+
+    @_raising_blob_outages
     def put(self, path: str, data: bytes) -> None:
         """Store an object; when this returns it survives a crash, of the machine too."""
         # In one piece: of several, those before a crash would stay in the bucket, where no list of objects shows them.
         obstore.put(self._store, path, data, use_multipart=False)
         self._sync_path(path)
 
-    @_raising_blob_outages()
+    @_raising_blob_outages
     def copy(self, path: str, to: str) -> bool:
         """Store an object a second time, as `put` does, without its bytes coming here; False if there is none."""
         try:
@@ -85,7 +120,7 @@ class Blobs:
         self._sync_path(to)
         return True
 
-    @_raising_blob_outages()
+    @_raising_blob_outages
     def move(self, path: str, to: str) -> bool:
         """Let an object be found elsewhere; in a folder that takes no room. False if there is none.
 
@@ -110,7 +145,7 @@ class Blobs:
             for folder in place.parents[: len(Path(path).parts)]:
                 _sync(folder)
 
-    @_raising_blob_outages()
+    @_raising_blob_outages
     def get(self, path: str) -> bytes | None:
         """An object, or None if there is none."""
         try:
@@ -118,7 +153,23 @@ class Blobs:
         except FileNotFoundError:
             return None
 
-    @_raising_blob_outages()
+    def read(self, path: str, stored_at: str | None = None) -> bytes | None:
+        """Return an object that is as it was stored, or None if there is none. Raises `DamagedBlob`.
+
+        `stored_at`: the path that it was stored at, whose hash it has, if it was moved since then.
+        """
+        pauses_s = [*AGAIN_S]
+        while True:
+            data = self.get(path)
+            damage = None if data is None else _damage(data, stored_at or path)
+            if damage is None:
+                return data
+            log.warning("damaged object", path=path, why=damage)
+            if not pauses_s:
+                raise DamagedBlob(damage)
+            time.sleep(pauses_s.pop(0))
+
+    @_raising_blob_outages
     def has(self, path: str) -> bool:
         """Whether there is such an object."""
         try:
@@ -127,7 +178,7 @@ class Blobs:
             return False
         return True
 
-    @_raising_blob_outages()
+    @_raising_blob_outages
     def delete_under(self, prefix: str) -> None:
         """Remove the folder `prefix` with every object in it."""
         if self._folder:
@@ -144,7 +195,7 @@ class Blobs:
             for entry in page:
                 yield entry["path"]
 
-    @_raising_blob_outages()
+    @_raising_blob_outages
     def delete(self, paths: Sequence[str]) -> None:
         """Remove objects."""
         obstore.delete(self._store, paths)
@@ -155,6 +206,30 @@ class Blobs:
             raise PermissionError(f"{self._folder} cannot be written")
         for _ in obstore.list(self._store, "readiness", chunk_size=1):
             break
+
+
+def outage_text(error: Exception) -> str:
+    """Return why one of `BLOB_OUTAGES` was raised, for whoever asked for something.
+
+    What a bucket's server says is for the log alone: it may be of anybody.
+    """
+    match error:
+        case BlobFolderUnavailable():
+            return str(error)
+        case PermissionDeniedError() | UnauthenticatedError():
+            return "the bucket does not take the service's credentials"
+        case _:
+            return "the bucket does not answer, or not as buckets do"
+
+
+def _damage(data: bytes, stored_at: str) -> str | None:
+    """Return in words what is wrong with an object; None: nothing that can be known."""
+    if not data:
+        return "it is empty"
+    hashed = HASH.search(stored_at)
+    if hashed is not None and hashlib.sha256(data).hexdigest() != hashed[1]:
+        return f"its {len(data)} bytes are not those that were stored"
+    return None
 
 
 def _credentials() -> S3Config:

@@ -7,7 +7,7 @@ tables nothing is copied: jobs that are still open are put into the queue of the
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -74,10 +74,13 @@ def require_empty(connection: sa.Connection) -> None:
         raise CannotCopy(f"The target has schema {found}, and this program {known}: name a new database or folder.")
 
 
-def copy_rows(source: sa.Connection, target: sa.Engine, enqueue: Enqueue) -> dict[str, int]:
+def copy_rows(
+    source: sa.Connection, target: sa.Engine, enqueue: Enqueue, committing: Callable[[], None]
+) -> dict[str, int]:
     """Copy every row into an empty database and put open jobs into its queue, in one transaction.
 
-    Gives how many rows each table has, which was counted in both.
+    Gives how many rows each table has, which was counted in both. `committing` is called when only the commit is left,
+    of which nobody knows what became if it is broken off.
     """
     with writing(target) as connection:
         advisory_lock(connection, "schema")
@@ -94,6 +97,7 @@ def copy_rows(source: sa.Connection, target: sa.Engine, enqueue: Enqueue) -> dic
         if there != here:
             wrong = [f"{name}: {there[name]} and {here[name]}" for name in there if there[name] != here[name]]
             raise CannotCopy(f"Source and copy have not the same number of rows, {'; '.join(wrong)}.")
+        committing()
         return here
 
 

@@ -21,6 +21,8 @@ from alembic.migration import MigrationContext
 from alembic.script import ScriptDirectory
 from sqlalchemy.dialects.sqlite.base import SQLiteCompiler
 
+from service.store.file_systems import network_file_system
+
 MIGRATIONS = Path(__file__).parent / "migrations"
 # Which schema a database has. Before the first release its name was that of Alembic's default, and the numbers of the
 # schemas in it were those that releases count by now.
@@ -75,6 +77,18 @@ def sqlite_file(url: str) -> Path | None:
     """The file of an SQLite database; None where the address is one of PostgreSQL."""
     parsed = sa.make_url(url)
     return Path(parsed.database or "") if parsed.get_backend_name() == "sqlite" else None
+
+
+def require_local_file(url: str) -> None:
+    """Raise `UnsupportedDatabase` if SQLite would lie on a file system of a network."""
+    file = sqlite_file(url)
+    kind = None if file is None else network_file_system(file)
+    if kind is not None:
+        raise UnsupportedDatabase(
+            f"The database {file} is SQLite on a network file system ({kind}), which damages it sooner or later. Use "
+            "PostgreSQL (ESC_DATABASE_URL), or a disk of this machine (ESC_DATA). If API and worker run on this one "
+            "machine and the file system keeps locks, ESC_SQLITE_ON_NETWORK=true starts it all the same."
+        )
 
 
 def connect(url: str) -> sa.Engine:

@@ -15,7 +15,7 @@ from typing import Any
 import sqlalchemy as sa
 
 from service.schemas.base import TOLERANTLY
-from service.schemas.live import LiveCamera, LiveMinute, LiveMinuteCamera, LiveReport, LiveState
+from service.schemas.live import LiveCamera, LiveMinute, LiveMinuteCamera, LiveReport, LiveSender, LiveState
 from service.schemas.venue import Venue
 from service.store import live_alarms, tables
 from service.store.database import Repository, advisory_lock, clock, reading, writing
@@ -61,7 +61,7 @@ class LiveRepository(Repository):
         """The newest report of each of these venues that is there."""
         v = tables.venues.c
         query = (
-            sa.select(v.id.label("venue"), r.reported_at, r.document)
+            sa.select(v.id.label("venue"), r.reported_at, r.document, r.watched)
             .select_from(tables.venues.outerjoin(tables.live_reports, r.venue == v.id))
             .where(v.id.in_(venue_ids))
         )
@@ -100,10 +100,11 @@ def _keep_newest(connection: sa.Connection, venue_id: str, report: LiveReport, n
     before = None if row is None else live_alarms.watch_in(row)
     watch = live_alarms.watch_after(before, report, now)
     cameras = [LiveCamera.from_input(camera) for camera in report.cameras]
+    watched, beside = live_alarms.watched_columns(watch)
     values = {
         "reported_at": now,
-        "document": to_document(report) | {"cameras": [to_document(camera) for camera in cameras]},
-        "watched": live_alarms.watched_column(watch),
+        "document": to_document(report) | {"cameras": [to_document(camera) for camera in cameras]} | beside,
+        "watched": watched,
         "alarm_due_at": live_alarms.due_after(before, None if row is None else row.alarm_due_at, watch, now),
     }
     if row is None:
@@ -133,9 +134,25 @@ def _state(row: Any, now: datetime) -> LiveState:
 
 
 def _reported(row: Any, now: datetime) -> LiveState:
-    running = now - row.reported_at <= RUNNING_WITHIN and not row.document.get("stopped", False)
-    values = row.document | {"reported_at": row.reported_at, "running": running}
+    watch = live_alarms.watch_in(row)
+    newest, *_ = watch.senders
+    others = [
+        LiveSender(
+            host=one.host,
+            pid=one.pid,
+            started_at=one.started_at,
+            reported_at=one.reported_at,
+            running=_is_running(one, now),
+        )
+        for one in watch.missed()
+        if one is not newest
+    ]
+    values = row.document | {"reported_at": row.reported_at, "running": _is_running(newest, now), "others": others}
     return LiveState.model_validate(values, **TOLERANTLY)
+
+
+def _is_running(sender: live_alarms.WatchedSender, now: datetime) -> bool:
+    return now - sender.reported_at <= RUNNING_WITHIN and not sender.stopped
 
 
 def _minute(row: Any) -> LiveMinute:

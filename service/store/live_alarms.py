@@ -6,22 +6,26 @@ SQL about when that is next to be looked at.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import Any
 
 import sqlalchemy as sa
 
-from service.schemas.base import Schema
+from service.schemas.base import TOLERANTLY, Schema
 from service.schemas.health import AlarmRule
 from service.schemas.live import LiveCameraIn, LiveReport
 from service.store import tables
 from service.store.documents import to_document
-from service.store.unreadable import read_or, read_values
+from service.store.unreadable import read_or
 
 NOT_MEASURED_FOR, LATE_FOR, SILENT_FOR = timedelta(seconds=10), timedelta(minutes=1), timedelta(seconds=30)
 LATE_MS = 1000.0
+# Of several processes for one venue: one that is missed for a day is none that anybody waits for, and a fleet of
+# renderers has two or three.
+FORGOTTEN_AFTER, MOST_OTHERS = timedelta(days=1), 8
+OTHERS = "others"
 SECOND = "%Y-%m-%d %H:%M:%S"
 # Rule and camera, which is empty where the alarm is of the whole venue.
 AlarmKey = tuple[AlarmRule, str]
@@ -45,14 +49,41 @@ class WatchedCamera(Schema):
         )
 
 
-@dataclass(frozen=True)
-class LiveWatch:
-    """What the alarms of a venue's live poses go by: the last report, and what was wrong with each tracked camera."""
+class WatchedSender(Schema):
+    """A process that sends live poses: when it reported first and last, and what was wrong with its tracked cameras."""
 
     host: str
+    pid: int | None = None
+    started_at: datetime
+    first_at: datetime
     reported_at: datetime
-    stopped: bool
+    stopped: bool = False
     cameras: dict[str, WatchedCamera]
+
+    def made(self, report: LiveReport) -> bool:
+        """Tell whether it made a report; the start alone tells apart what has one host and pid in two containers."""
+        return (self.host, self.pid, self.started_at) == (report.host, report.pid, report.started_at)
+
+    def deadlines(self) -> Iterator[tuple[AlarmKey, datetime, str]]:
+        """Yield the rules that will be broken unless a better report comes before: which, when, and the reason."""
+        silent = (
+            f"The process on {self.host} that sends live poses has not reported since {self.reported_at:{SECOND}} UTC."
+        )
+        yield ("live-silent", ""), self.reported_at + SILENT_FOR, silent
+        for camera, watched in self.cameras.items():
+            if (since := watched.not_measured_since) is not None:
+                why = f"Camera {camera} was not measured in its stream since {since:{SECOND}} UTC."
+                yield ("live-not-measured", camera), since + NOT_MEASURED_FOR, why
+            if (since := watched.late_since) is not None:
+                why = f"Poses of camera {camera} are sent over 1 s after their pictures since {since:{SECOND}} UTC."
+                yield ("live-late", camera), since + LATE_FOR, why
+
+
+@dataclass(frozen=True)
+class LiveWatch:
+    """What the alarms of a venue's live poses go by: each process that sends them, the one that reported last first."""
+
+    senders: list[WatchedSender]
 
     def broken(self, now: datetime) -> dict[AlarmKey, str]:
         """The rules that are broken at a time, with their reasons."""
@@ -62,20 +93,24 @@ class LiveWatch:
         """When the next rule is broken, unless a better report comes before."""
         return min((at for at, _ in self._deadlines().values() if at > now), default=None)
 
+    def missed(self) -> list[WatchedSender]:
+        """Return the processes that are missed when they are silent.
+
+        One that was told to end is not, nor one whose place another took: that began when it had reported for the last
+        time, as does what is started again after a crash.
+        """
+        return [
+            one
+            for one in self.senders
+            if not one.stopped and not any(other.first_at > one.reported_at for other in self.senders)
+        ]
+
     def _deadlines(self) -> dict[AlarmKey, tuple[datetime, str]]:
-        if self.stopped:
-            return {}
-        silent = (
-            f"The process on {self.host} that sends live poses has not reported since {self.reported_at:{SECOND}} UTC."
-        )
-        found: dict[AlarmKey, tuple[datetime, str]] = {("live-silent", ""): (self.reported_at + SILENT_FOR, silent)}
-        for camera, watched in self.cameras.items():
-            if (since := watched.not_measured_since) is not None:
-                why = f"Camera {camera} was not measured in its stream since {since:{SECOND}} UTC."
-                found["live-not-measured", camera] = since + NOT_MEASURED_FOR, why
-            if (since := watched.late_since) is not None:
-                why = f"Poses of camera {camera} are sent over 1 s after their pictures since {since:{SECOND}} UTC."
-                found["live-late", camera] = since + LATE_FOR, why
+        found: dict[AlarmKey, tuple[datetime, str]] = {}
+        for sender in self.missed():
+            for key, at, why in sender.deadlines():
+                if key not in found or at < found[key][0]:
+                    found[key] = at, why
         return found
 
 
@@ -87,27 +122,56 @@ def watch_of(connection: sa.Connection, venue_id: str) -> LiveWatch | None:
 
 def watch_in(row: Any) -> LiveWatch:
     """Return what is watched of a venue by its row of `live_reports`."""
-    cameras = read_values(WatchedCamera, row.watched, "live", row.venue)
-    host, stopped = read_or(("", True), "live", row.venue, lambda: _sender(row.document))
-    return LiveWatch(host, row.reported_at, stopped, cameras)
+    unknown = WatchedSender(
+        host="",
+        started_at=row.reported_at,
+        first_at=row.reported_at,
+        reported_at=row.reported_at,
+        stopped=True,
+        cameras={},
+    )
+    return read_or(LiveWatch([unknown]), "live", row.venue, lambda: LiveWatch(_senders(row)))
 
 
-def _sender(document: Any) -> tuple[str, bool]:
-    """Return the host of the process that sends live poses, and whether it has stopped."""
-    return document["host"], document.get("stopped", False)
+def _senders(row: Any) -> list[WatchedSender]:
+    newest = {"first_at": row.reported_at, **row.document, "reported_at": row.reported_at, "cameras": row.watched}
+    return [WatchedSender.model_validate(one, **TOLERANTLY) for one in (newest, *row.document.get(OTHERS, []))]
 
 
 def watch_after(before: LiveWatch | None, report: LiveReport, now: datetime) -> LiveWatch:
     """Return what is watched of a venue after a report that arrives `now`."""
-    known = {} if before is None else before.cameras
+    senders = [] if before is None else before.senders
+    known = next((one for one in senders if one.made(report)), None)
+    # One that is new goes on from what was known by the last that reported, whose place it may take.
+    watched = (known or senders[0]).cameras if senders else {}
     tracked = [camera for camera in report.cameras if camera.stream is not None]
-    cameras = {camera.id: known.get(camera.id, WatchedCamera()).after(camera, now) for camera in tracked}
-    return LiveWatch(report.host, now, report.stopped, cameras)
+    sender = WatchedSender(
+        host=report.host,
+        pid=report.pid,
+        started_at=report.started_at,
+        first_at=now if known is None else known.first_at,
+        reported_at=now,
+        stopped=report.stopped,
+        cameras={camera.id: watched.get(camera.id, WatchedCamera()).after(camera, now) for camera in tracked},
+    )
+    others = [one for one in senders if one is not known and _is_to_be_kept(one, sender)]
+    return LiveWatch([sender, *others[:MOST_OTHERS]])
 
 
-def watched_column(watch: LiveWatch) -> dict[str, Any]:
-    """Return the column `watched` of a row of `live_reports`."""
-    return {camera: to_document(one) for camera, one in watch.cameras.items()}
+def _is_to_be_kept(other: WatchedSender, newest: WatchedSender) -> bool:
+    if other.stopped:
+        return False
+    silent_for = newest.reported_at - other.reported_at
+    # It may run as well and only report after one that has just begun, or may have ended before that.
+    overlaps = other.reported_at >= newest.first_at
+    return silent_for < (FORGOTTEN_AFTER if overlaps else SILENT_FOR)
+
+
+def watched_columns(watch: LiveWatch) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return what a row of `live_reports` keeps of it: the column `watched`, and what is added to `document`."""
+    newest, *others = watch.senders
+    cameras = {camera: to_document(one) for camera, one in newest.cameras.items()}
+    return cameras, {"first_at": to_document(newest)["first_at"], OTHERS: [to_document(one) for one in others]}
 
 
 def due_after(before: LiveWatch | None, due_at: datetime | None, after: LiveWatch, now: datetime) -> datetime | None:

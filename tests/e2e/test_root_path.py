@@ -45,6 +45,23 @@ def test_where_an_answer_leads_to_is_below_the_path(http, name):
     assert (ended["status"], ended["links"]["self"]) == ("succeeded", f"/jobs/{ended['id']}")
 
 
+@pytest.mark.parametrize("path", ["/venues", "/venues/v/calibrate", "/ui/jobs", "/docs"])
+@pytest.mark.parametrize("host", ["evil.example", "evil.example:8000"])
+def test_an_address_with_one_slash_too_many_leads_below_the_path_of_the_same_host(below, path, host):
+    service, key = below
+    said = {"Host": host, "Authorization": f"Bearer {key}"}
+    asks = service.http.post if path.endswith("calibrate") else service.http.get
+    for asked in (f"{ROOT}{path}/?limit=1", f"{path}/?limit=1"):
+        answer = asks(asked, headers=said, follow_redirects=False)
+        assert (answer.status_code, answer.headers["location"]) == (307, f"{ROOT}{path}?limit=1")
+
+
+@pytest.mark.parametrize("host", ["[", "[::1", "a b", "a:b:c"])
+def test_a_host_that_is_none_is_no_mistake_of_the_service(below, host):
+    for path in ("/venues/", "/nothing", "/ui/jobs"):
+        assert below[0].http.get(f"{ROOT}{path}", headers={"Host": host}, follow_redirects=False).status_code < 500
+
+
 def test_the_next_page_of_a_list_is_below_the_path(http, name):
     http.put(f"/venues/{name}-2", json=venue(f"{name}-2")).raise_for_status()
     first = http.get("/venues", params={"limit": 1})

@@ -103,6 +103,20 @@ def test_a_page_says_that_the_service_is_away_and_goes_on_when_it_is_back(tmp_pa
     service.kill()
 
 
+@pytest.mark.parametrize("path", ["/", "/ui/jobs"])
+def test_a_list_says_that_the_service_is_away_and_goes_on_when_it_is_back(tmp_path, visit, path):
+    service = Service(tmp_path / "coming-back", "serve")
+    service.venue("patient")
+    page = visit(service.url, path, forgiven=AWAY)
+    hint = page.get_by_text("The service does not answer.")
+    expect(hint).to_have_count(0)
+    assert service.stop() == 0
+    expect(hint).to_be_visible(timeout=20_000)
+    service.start(int(service.url.rpartition(":")[2]))
+    expect(hint).to_have_count(0, timeout=20_000)
+    service.kill()
+
+
 def test_a_hidden_page_holds_no_connection_and_a_page_in_sight_catches_up(tmp_path, visit):
     service = Service(tmp_path / "one-place", "serve", ESC_FOLLOWERS="1")
     service.venue("shared")

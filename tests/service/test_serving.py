@@ -1,6 +1,12 @@
+import json
+import os
+import re
+import socket
 import subprocess
 import sys
+from contextlib import contextmanager, suppress
 from itertools import pairwise
+from pathlib import Path
 
 import pytest
 from structlog.testing import capture_logs
@@ -8,6 +14,8 @@ from structlog.testing import capture_logs
 from service import serving
 from service.settings import Settings
 from tests.e2e.running import wait_for
+
+DOCKERFILE = Path(__file__).parents[2] / "docker" / "Dockerfile"
 
 
 @pytest.fixture
@@ -46,3 +54,45 @@ def test_an_ipv6_address_is_told_as_a_url_has_it(tmp_path):
         line = api.stdout.readline()
         api.terminate()
     assert line.startswith("ESC listens on http://[::1]:")
+
+
+@contextmanager
+def listening(folder, host):
+    """The port of an API on a host."""
+    command = [sys.executable, "-m", "service.cli", "serve", "--data", str(folder)]
+    environment = os.environ | {"ESC_HOST": host, "ESC_PORT": "0", "ESC_AUTH": "off"}
+    with subprocess.Popen(
+        command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+    ) as api:
+        try:
+            yield int(api.stdout.readline().rpartition(":")[2])
+        finally:
+            api.terminate()
+
+
+def health(host, port):
+    """The exit code of the image's own check, in whose environment a proxy may be named."""
+    check = re.search(r"^HEALTHCHECK .*?CMD (\[.*?\])$", DOCKERFILE.read_text(), re.DOTALL | re.MULTILINE)[1]
+    environment = os.environ | {"ESC_HOST": host, "ESC_PORT": str(port), "http_proxy": "http://127.0.0.1:1"}
+    return subprocess.run(
+        [sys.executable, *json.loads(check)[1:]], env=environment, stderr=subprocess.DEVNULL
+    ).returncode
+
+
+@pytest.mark.parametrize(
+    ("host", "answers"),
+    [("::", {"127.0.0.1", "::1"}), ("0.0.0.0", {"127.0.0.1"}), ("::1", {"::1"}), ("127.0.0.2", {"127.0.0.2"})],
+)
+def test_the_image_is_healthy_on_whatever_it_listens_and_both_versions_of_ip_are_answered_on_all(
+    tmp_path, host, answers
+):
+    def is_answered(at, port):
+        with suppress(OSError), socket.create_connection((at, port), 10):
+            return True
+        return False
+
+    with listening(tmp_path, host) as port:
+        assert {at for at in ("127.0.0.1", "127.0.0.2", "::1") if is_answered(at, port)} >= answers
+        assert host != "::1" or not is_answered("127.0.0.1", port)
+        assert health(host, port) == 0
+    assert health(host, port) == 1

@@ -8,6 +8,16 @@ from dataclasses import dataclass
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
+# What servers say of their own accord, which nobody is to read through the service.
+TELLTALE = (
+    b"220 admin console, token=hunter2\r\n\r\n",
+    b"HTTP/1.1 500 token=hunter2\r\n\r\n",
+    b"HTTP/1.1 200 OK\r\ntoken hunter2\r\n\r\n",
+    b"HTTP/1.1 200 OK\r\nTransfer-Encoding: token=hunter2\r\n\r\n",
+    b"HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n\r\nhunter2\r\n",
+    b"HTTP/1.1 401 token\r\nWWW-Authenticate: Digest hunter2\r\n\r\n",
+)
+
 
 @dataclass(frozen=True)
 class Received:
@@ -97,3 +107,13 @@ class Endless(Receiver):
                 request.wfile.write(bytes(65536))
         except OSError:
             self.broken_off.set()
+
+
+class Telltale(Receiver):
+    """Says the bytes `says` in answer to whatever is asked, in a protocol of its own perhaps."""
+
+    says = b""
+
+    def respond(self, request: BaseHTTPRequestHandler, _: int) -> None:
+        request.wfile.write(self.says)
+        request.close_connection = True

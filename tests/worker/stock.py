@@ -2,6 +2,7 @@
 
 from collections.abc import Collection
 from datetime import datetime, timedelta
+from hashlib import sha256
 from pathlib import Path
 
 import sqlalchemy as sa
@@ -16,7 +17,7 @@ from service.settings import Settings
 from service.store import tables
 from service.store.blobs import Blobs
 from service.store.ids import new_id
-from service.store.jobs.files import picture_folder
+from service.store.jobs.files import frame_path, picture_folder
 from service.store.jobs.submission import Submission
 from service.store.repositories import Repositories
 from tests.e2e.running import venue
@@ -37,7 +38,7 @@ class Stock(Repositories):
             job_id=job_id,
             venue=self.venue(venue_id),
             options=Options(seed=1, **options),
-            frames={"left": [f"frames/{job_id}/left/0"]},
+            frames={"left": [frame_path(job_id, "left", 0, sha256(b"frame").hexdigest())]},
             content_hash=job_id,
             idempotency_key=None,
         )

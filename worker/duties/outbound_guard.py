@@ -50,6 +50,25 @@ def look_up(target: httpx.URL) -> list[str]:
             raise HostNotFoundError(f"{name} cannot be looked up within {LOOK_UP_S:g} s")
 
 
+def failure_text(error: httpx.HTTPError) -> str:
+    """Return why a request failed, in words of our own.
+
+    Those of httpx repeat what a server said that speaks another protocol, to whoever could name its address.
+    """
+    match error:
+        case httpx.ConnectError():
+            # By the operating system or OpenSSL.
+            return f"no connection: {error}"
+        case httpx.TimeoutException():
+            return "no answer in time"
+        case httpx.NetworkError():
+            return "the connection broke off"
+        case httpx.RemoteProtocolError():
+            return "no whole answer by HTTP: it speaks another protocol, or the connection broke off"
+        case _:
+            return f"no answer that can be read ({type(error).__name__})"
+
+
 def stream(
     client: httpx.AsyncClient,
     method: str,

@@ -98,8 +98,12 @@ class WebhookDelivery:
                 return
             try:
                 answer = self._send(delivery, told.model_dump_json().encode())
+            except webhook_request.SendError as error:
+                self._failed(delivery, str(error))
+                return
             except Exception as error:  # whatever comes of this address, it is one attempt of one delivery
-                self._failed(delivery, str(error) or type(error).__name__)
+                log.exception("callback cannot be sent")
+                self._failed(delivery, type(error).__name__)
                 return
             if 200 <= answer.status < 300:
                 self._deliveries.mark_delivered(delivery)

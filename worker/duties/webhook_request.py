@@ -64,7 +64,7 @@ def send(
     except TimeoutError:
         raise SendError(f"no answer within {TIMEOUT_S:g} s") from None
     except httpx.HTTPError as error:
-        raise SendError(f"{type(error).__name__}: {error}") from None
+        raise SendError(outbound_guard.failure_text(error)) from None
 
 
 def _look_up(target: httpx.URL, settings: Settings) -> list[str]:

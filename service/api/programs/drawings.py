@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from weakref import WeakValueDictionary
 
 from starlette.concurrency import run_in_threadpool
@@ -18,7 +18,7 @@ from service.api.programs.running import run_program
 from service.schemas.problems import Problem
 from service.schemas.programs.drawing import DrawingRequest, DrawnPictures, decode_files, encode_message
 from service.settings import Settings
-from service.store.blobs import Blobs
+from service.store.blobs import Blobs, DamagedBlob
 from service.store.jobs.files import drawn_together, picture_file, pictures_folder, source_file
 from service.store.jobs.queries import Drawable, JobRepository, Pictures
 
@@ -70,10 +70,7 @@ class Drawings:
         """Of the cameras that a picture shows; from their own folder, or what was kept of it."""
         of_one = name.partition("_")[2]
         needed = [of_one] if of_one in job.frames and f"frame_{of_one}" in drawn_together(name) else job.frames
-        return {
-            camera: self._blobs.get(job.frames[camera]) or self._blobs.get(source_file(pictures.folder, camera))
-            for camera in needed
-        }
+        return {camera: drawable_frame(self._blobs, job.frames[camera], pictures.folder, camera) for camera in needed}
 
     def _forget_if_gone(self, job_id: str) -> None:
         """Who tidied up while they were drawn does not come again."""
@@ -82,7 +79,22 @@ class Drawings:
             self._blobs.delete_under(pictures_folder(job_id))
 
     def _stored(self, pictures: Pictures, name: str) -> bytes | None:
-        return self._blobs.get(f"{pictures.folder}/{picture_file(name)}")
+        """The file of a picture; one that is damaged is as good as none, and may be drawn again."""
+        with suppress(DamagedBlob):
+            return self._blobs.read(f"{pictures.folder}/{picture_file(name)}")
+        return None
+
+
+def drawable_frame(blobs: Blobs, path: str, pictures_folder: str, camera: str) -> bytes | None:
+    """Return the frame of a camera that pictures are drawn of, from its own path or what was kept of it.
+
+    None if it is gone, or is not what was stored.
+    """
+    for place in (path, source_file(pictures_folder, camera)):
+        with suppress(DamagedBlob):
+            if frame := blobs.read(place, stored_at=path):
+                return frame
+    return None
 
 
 @asynccontextmanager

@@ -3,6 +3,7 @@
 import {loadAgain, say, tellTimes} from "./page.js";
 
 const WHOLE = new AbortController();
+const AWAY = "The service does not answer. The page goes on by itself when it is back.";
 const REACHABLE = "a[href], button, input, select, textarea, summary, [tabindex]";
 const acts = [];
 const ends = new WeakMap();
@@ -65,7 +66,8 @@ async function fetchAndReplace() {
   const answer = await fetch(location.href).catch(() => null);
   // Whoever is signed out meanwhile, or looks at what was deleted, is shown so.
   if (answer && (answer.redirected || answer.status === 404)) return loadAgain();
-  if (!answer || !answer.ok) return null;
+  if (!answer || !answer.ok) return say(AWAY, true);
+  if (document.getElementById("says").textContent === AWAY) say("");
   const there = new DOMParser().parseFromString(await answer.text(), "text/html");
   let isWhole = true;
   for (const part of parts()) {

@@ -23,7 +23,7 @@ from service.schemas.problems import Problem
 from service.schemas.venue import Venue
 from service.settings import Settings
 from service.store.ids import new_id
-from service.store.jobs.files import frame_folder
+from service.store.jobs.files import frame_path
 from service.store.jobs.submission import (
     KeyReused,
     QueueFull,
@@ -119,6 +119,8 @@ def _submission(
         image_checks.check_length(upload.size or 0, context.settings, **{part: name})
     cameras = {camera.id: camera for camera in about.cameras} if about else {}
     budget = image_checks.PixelBudget(context.settings)
+    # A camera without a frame is named all the same: points are enough for its pose.
+    hashes: dict[str, list[str]] = {name: [] for name in files}
     for name, several in files.items():
         content.update(f"\n{name}".encode())
         for upload in several:
@@ -128,17 +130,22 @@ def _submission(
                 else:
                     resize = kind != "locate"
                     image_checks.check(cameras[name], data, context.settings, budget, of_any_size=resize)
-                content.update(hashlib.sha256(data).digest())
+                digest = hashlib.sha256(data)
+                content.update(digest.digest())
+                hashes[name].append(digest.hexdigest())
             del data
     # A photo may be called anything.
-    photos = {name: [f"{frame_folder(job_id)}/photos/{number}"] for number, name in enumerate(files)}
+    photos = {
+        name: [frame_path(job_id, "photos", number, one) for one in several]
+        for number, (name, several) in enumerate(hashes.items())
+    }
     return Submission(
         job_id=job_id,
         kind=kind,
         venue=None if isinstance(about, SoughtSite) else about,
         site=site,
         options=seeded(options),
-        frames=frame_paths(job_id, {name: len(several) for name, several in files.items()}) if about else photos,
+        frames=frame_paths(job_id, hashes) if about else photos,
         origin=sender.origin,
         content_hash=content.hexdigest(),
         idempotency_key=sender.idempotency_key,

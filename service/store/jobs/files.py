@@ -20,6 +20,11 @@ def frame_folder(job_id: str) -> str:
     return f"frames/{job_id}"
 
 
+def frame_path(job_id: str, part: str, number: int, sha256: str) -> str:
+    """Where a frame of a camera lies, or a photo; the hash of its bytes is in its name, by which it is known again."""
+    return f"{frame_folder(job_id)}/{part}/{number}.{sha256}"
+
+
 def pictures_folder(job_id: str) -> str:
     """Where the pictures of all attempts of a job lie."""
     return f"pictures/{job_id}"

@@ -14,6 +14,7 @@ import time
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
+from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
@@ -171,7 +172,7 @@ def _calibrated(home: ApplicationState, venue_id: str) -> str:
         job_id=job_id,
         venue=stored,
         options=Options(seed=1),
-        frames=frame_paths(job_id, dict.fromkeys(CAMERAS, 1)),
+        frames=frame_paths(job_id, {camera: [sha256(b"frame").hexdigest()] for camera in CAMERAS}),
         content_hash=job_id,
         idempotency_key=None,
     )

@@ -79,6 +79,23 @@ def test_poses_go_on_when_the_service_is_gone(start, name):
         assert number in (1, 2)
 
 
+@pytest.mark.parametrize("arguments", [["live", "tests/demo/venue.json", "--json"], ["--version"], ["--help"]])
+def test_a_command_whose_output_nobody_reads_any_more_ends_in_silence(arguments):
+    reads, writes = os.pipe()
+    os.close(reads)
+    with warm.Popen(
+        [sys.executable, "-m", "service.cli", *arguments], stdout=writes, stderr=PIPE, text=True
+    ) as process:
+        os.close(writes)
+        try:
+            told = process.communicate(timeout=60)[1]
+        finally:
+            process.kill()
+    # 1 is Typer's own, where printing itself fails.
+    assert process.returncode in (0, 1)
+    assert [line for line in told.splitlines() if not line.startswith("Sending the poses")] == []
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
@@ -87,6 +104,11 @@ def test_poses_go_on_when_the_service_is_gone(start, name):
         (["--rate", "0"], "--rate 0: samples a second"),
         (["--freed", "10.1.0.20"], "--freed 10.1.0.20: expected HOST:PORT"),
         (["--opentrackio", "10.1.0.20:70000"], "expected HOST:PORT"),
+        (["--zoom", "left=5"], "--zoom and --focus are sent by FreeD alone"),
+        (
+            ["--freed", "10.1.0.20:40000", "--focus", "left=16777216"],
+            "--focus left=16777216: expected a count from 0 to",
+        ),
     ],
 )
 def test_what_is_no_rate_or_address_is_a_usage_error(service, tmp_path, arguments, said):

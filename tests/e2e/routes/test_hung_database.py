@@ -7,7 +7,9 @@ import httpx
 import pytest
 import sqlalchemy as sa
 
+from service.api.context import STREAM_PATIENCE_S
 from service.store.database import connect, migrate, without_timeouts
+from tests.e2e.routes.test_following import followed
 from tests.homes import on_servers
 
 # More than there are threads and connections.
@@ -47,6 +49,20 @@ def test_a_locked_table_is_told_within_seconds_and_readiness_at_once(start, home
     }
     assert max(seconds for _, seconds in answers) < LONGEST_S
     assert asked(service, "/venues/v")[0].status_code == 200
+
+
+@on_servers
+def test_who_follows_a_venue_hears_within_seconds_that_the_database_is_away(start, home):
+    service = start("serve", ESC_AUTH="off")
+    service.venue("v")
+    with followed(service, "v") as stream:
+        stream.next()
+        with home.database_away(service.data):
+            begun = time.monotonic()
+            with pytest.raises((EOFError, httpx.RemoteProtocolError)):
+                stream.next()
+            assert time.monotonic() - begun < STREAM_PATIENCE_S + 2 * BUSY_S
+            assert asked(service, "/venues/v/events")[0].status_code == 503
 
 
 @on_servers

@@ -10,7 +10,6 @@ import pytest
 import sqlalchemy as sa
 
 from service.store import tables
-from service.store.blobs import Blobs
 from tests.e2e.observe.figures import figures
 from tests.e2e.running import DEADLINE_S, SIZE, alive, png, upload, venue, wait_for
 from tests.homes import in_both_homes
@@ -380,7 +379,7 @@ def test_without_a_worker_a_service_goes_on_answering_and_says_what_is_missing(u
 def test_the_frames_that_were_sent_are_the_frames_that_are_kept(service, name):
     job = service.submitted(service.venue(name), 5)
     service.end(job)
-    assert Blobs(service.blob_url).get(f"frames/{job}/left/0") == png(*SIZE, shade=5)
+    assert service.http.get(f"/jobs/{job}/frames/0").content == png(*SIZE, shade=5)
 
 
 @in_both_homes

@@ -1,15 +1,19 @@
 """A whole home in another database: between a folder and servers, through the command."""
 
 import os
+import signal
+import sys
 from datetime import UTC, datetime
+from subprocess import PIPE
 
 import pytest
 import sqlalchemy as sa
 
 from service.store import tables
 from service.store.database import connect, migrate, writing
+from tests.e2e import warm
 from tests.e2e.commands import esc_here, esc_process
-from tests.e2e.running import Service
+from tests.e2e.running import Service, wait_for
 from tests.homes import Embedded, environment, files
 
 GETS = (
@@ -158,6 +162,42 @@ def test_a_service_on_the_copy_answers_as_the_one_before_and_goes_on(servers, st
     assert both.end(waiting)["status"] == "succeeded"
     assert both.calibrated("v", 2)["venue_revision"] > job["venue_revision"]
     assert both.stop() == 0
+
+
+def home_with_files(folder, count=300):
+    a_row_in_every_table(Embedded().database_url(folder))
+    (folder / "blobs" / "frames").mkdir(parents=True)
+    for number in range(count):
+        (folder / "blobs" / "frames" / f"{number}").write_bytes(b"a frame")
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGINT, signal.SIGKILL], ids=lambda n: n.name)
+def test_a_copy_that_is_ended_leaves_nothing_or_what_the_next_one_goes_on_with(tmp_path, number):
+    here, there = tmp_path / "here", tmp_path / "there"
+    home_with_files(here)
+    command = [sys.executable, "-m", "service.cli", "home", "copy", str(here), str(there)]
+    with warm.Popen(command, cwd=tmp_path, stderr=PIPE, text=True) as copying:
+        wait_for(lambda: (there / "blobs" / "frames" / "50").exists())
+        copying.send_signal(number)
+        # A second time, as by a user who is in a hurry.
+        copying.send_signal(number)
+        copying.communicate(timeout=60)
+    assert copying.returncode in (128 + number, -number)
+    assert (number == signal.SIGKILL) == bool(files((there / "blobs").as_uri()))
+    assert (number == signal.SIGKILL) == (there / "esc.sqlite").exists()
+    again = esc_process(tmp_path, "home", "copy", str(here), str(there))
+    assert again.returncode == 0, again.stderr
+    assert files((there / "blobs").as_uri()) == files((here / "blobs").as_uri())
+
+
+def test_a_store_with_files_of_somebody_else_is_refused_and_left_alone(esc, tmp_path):
+    here, there = tmp_path / "here", tmp_path / "there"
+    home_with_files(here, 3)
+    (there / "blobs" / "frames").mkdir(parents=True)
+    (there / "blobs" / "frames" / "theirs").write_bytes(b"a frame")
+    run = esc("home", "copy", str(here), str(there))
+    assert (run.returncode, "files that FROM has not (1, such as frames/theirs)" in run.stderr) == (2, True), run.stderr
+    assert files((there / "blobs").as_uri()) == ["frames/theirs"]
 
 
 def answers(service, job):

@@ -10,6 +10,7 @@ from service.api.programs import drawings
 from service.api.programs.drawings import Drawings
 from service.schemas.problems import Problem
 from service.settings import Settings
+from service.store import blobs
 from service.store.jobs.files import source_file
 from tests.e2e.running import wait_for
 from tests.homes import in_both_homes
@@ -84,11 +85,21 @@ def test_a_picture_of_poses_that_show_nothing_is_none(stock, drawing, job):
 @in_both_homes
 def test_pictures_are_drawn_of_what_was_kept_when_the_frames_went(stock, drawing, job):
     folder = stock.jobs.pictures(job).folder
-    assert stock.blobs.move(f"frames/{job}/left/0", source_file(folder, "left"))
+    assert stock.blobs.move(stock.jobs.frame(job, 0), source_file(folder, "left"))
     stock.blobs.delete_under(f"frames/{job}")
     assert look(drawing(), stock, job, "overlay_left") == [b"overlay_left:frame"]
     stock.blobs.delete_under(f"{folder}/source")
     assert look(drawing(), stock, job, "birdseye") == [None]
+
+
+def test_a_picture_without_bytes_is_drawn_again_and_only_of_frames_as_they_came(stock, drawing, job, monkeypatch):
+    monkeypatch.setattr(blobs, "AGAIN_S", ())
+    folder = stock.jobs.pictures(job).folder
+    stock.blobs.put(f"{folder}/birdseye.jpg", b"")
+    assert look(drawing(), stock, job, "birdseye") == [b"birdseye:frame"]
+    stock.blobs.put(f"{folder}/mask_left.png", b"")
+    stock.blobs.put(stock.jobs.frame(job, 0), b"fra")
+    assert look(drawing(), stock, job, "mask_left", "overlay_left") == [None, None]
 
 
 def test_nothing_is_left_of_a_picture_whose_time_ended_while_it_was_drawn(stock, drawing, job, tmp_path):

@@ -5,16 +5,18 @@ import json
 from dataclasses import replace
 from fractions import Fraction
 
+import cv2
 import jsonschema
 import numpy as np
 import pytest
 
 from service.formats import opentrackio
 from service.formats.clip import ClipPoses, TrackedCamera
+from service.formats.opentrackio import SteadyAngles
 from service.schemas.geometry import Pose
 from service.schemas.problems import Problem
 from tests.service.formats.cameras import ALL_OF_OPENCV_8, farthest, seen_points, shot
-from tests.service.formats.test_formats import AS_PUBLISHED_PX, SCHEMA, project_by_opentrackio, read_freed
+from tests.service.formats.test_formats import AS_PUBLISHED_PX, SCHEMA, project_by_opentrackio, read_freed, turn
 
 FRAMES = 60
 AXES = "x y z pan tilt roll"
@@ -61,14 +63,29 @@ def test_samples_say_the_rate_exactly_the_timecode_of_their_frame_and_how_they_a
 
 def test_timecode_goes_on_after_an_hour_and_starts_anew_after_a_day():
     for number, expected in ((25 * 3661 + 3, [1, 1, 1, 3]), (25 * 86400, [0, 0, 0, 0])):
-        sample = json.loads(opentrackio.write_frame(shot(), opentrackio.Frame(number, Fraction(25), "measured")))
+        sample = json.loads(
+            opentrackio.write_frame(shot(), opentrackio.Frame(number, Fraction(25), "measured"), SteadyAngles())
+        )
         jsonschema.Draft202012Validator(SCHEMA).validate(sample)
         assert [sample["timing"]["timecode"][part] for part in ("hours", "minutes", "seconds", "frames")] == expected
 
 
 def test_a_rate_that_timecode_cannot_count_is_refused():
     with pytest.raises(Problem, match="up to 120 frames a second; the clip has 240"):
-        opentrackio.write_frame(shot(), opentrackio.Frame(0, Fraction(240), "measured"))
+        opentrackio.write_frame(shot(), opentrackio.Frame(0, Fraction(240), "measured"), SteadyAngles())
+
+
+@pytest.mark.parametrize("about", ["z", "y"], ids=["pan", "roll"])
+def test_angles_go_on_over_half_a_turn(about):
+    """A camera that looks towards the near side, or hangs upside down, and sways."""
+    angles, found = SteadyAngles(), []
+    for degrees in (179.99, 180.01, 180.5, 179.5):
+        ahead = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
+        rotation = cv2.Rodrigues(ahead @ turn(about, degrees).T)[0].ravel().tolist()
+        frame = opentrackio.Frame(0, Fraction(25), "measured")
+        sample = json.loads(opentrackio.write_frame(shot(rotation=rotation), frame, angles))
+        found.append(sample["transforms"][0]["rotation"][{"z": "pan", "y": "roll"}[about]])
+    assert found == pytest.approx([179.99, 180.01, 180.5, 179.5], abs=1e-6)
 
 
 def test_freed_has_a_packet_for_each_camera_and_frame(written):

@@ -173,6 +173,12 @@ def test_freed_is_a_packet_per_camera_with_its_number():
     assert read_freed(packets[:29])[3] == [0, 0]
 
 
+def test_freed_has_the_counts_of_zoom_and_focus_that_are_given():
+    counts = {"camera-1": freed.EncoderCounts(zoom=0x010203, focus=0x7FFFFF)}
+    packets = freed.write([shot(number=1), shot(number=7)], "x y z pan tilt roll", counts)
+    assert [read_freed(packets[at : at + 29])[3] for at in (0, 29)] == [[0x010203, 0x7FFFFF], [0, 0]]
+
+
 def test_pan_of_freed_is_the_opposite_of_that_of_opentrackio():
     camera = shot()
     _, (pan, tilt, roll), _, _ = read_freed(freed.write([camera], "x y z pan tilt roll"))

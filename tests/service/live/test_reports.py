@@ -11,6 +11,7 @@ from service.live.destinations import Tracked
 from service.live.reports import LiveReporter, SentPose
 from service.live.stored_poses import StoredPoses
 from service.schemas.geometry import Pose
+from service.schemas.live import LiveSender, LiveState
 from service.schemas.venue import VenueIn
 from tests.e2e.running import venue
 
@@ -101,3 +102,19 @@ def test_reports_go_on_when_the_service_is_back_and_end_with_one_that_says_so(re
     (venue_id, first), *_, (_, last) = service.reports
     assert (venue_id, first.cameras[0].measured, first.stopped) == ("v", 1, False)
     assert (last.cameras[0].measured, last.stopped) == (0, True)
+
+
+def test_others_that_report_are_named_and_it_is_not_one_of_them(reporter):
+    mine = reporter.report()
+    other = {"host": "truck", "pid": 7, "started_at": mine.started_at, "reported_at": mine.started_at}
+    state = LiveState(
+        running=True,
+        **{name: getattr(mine, name) for name in ("host", "pid", "started_at")},
+        others=[LiveSender(**other, running=True), LiveSender(**other | {"host": "gone"}, running=False)],
+    )
+    assert reporter.running_others(state) == ["truck (process 7)"]
+    assert reporter.running_others(state.model_copy(update={"pid": 8})) == [
+        "truck (process 7)",
+        f"{mine.host} (process 8)",
+    ]
+    assert reporter.running_others(LiveState()) == []

@@ -2,10 +2,12 @@
 
 import json
 import math
+import os
 import socket
 import struct
 import threading
 import time
+from contextlib import suppress
 from fractions import Fraction
 from io import StringIO
 from pathlib import Path
@@ -13,7 +15,9 @@ from pathlib import Path
 import jsonschema
 import pytest
 
+from service.live import host_lookup
 from service.live.destinations import FreeD, JsonLines, OpenTrackIO, PoseSender, UdpSocket
+from service.live.host_lookup import HostLookup
 from service.live.stored_poses import StoredPoses, send_stored_poses
 from service.schemas.geometry import Pose
 from service.schemas.venue import VenueIn
@@ -58,7 +62,8 @@ class Sending:
         self.poses = poses or StoredPoses(demo())
         self.errors = []
         self._stop = threading.Event()
-        sender = PoseSender(destinations, self.errors.append)
+        named = {str(number): one for number, one in enumerate(destinations)}
+        sender = PoseSender(named, lambda _, error: error and self.errors.append(error), self._stop.set)
         self._thread = threading.Thread(target=send_stored_poses, args=(self.poses, sender, rate, self._stop))
 
     def __enter__(self):
@@ -68,6 +73,10 @@ class Sending:
     def __exit__(self, *_):
         self._stop.set()
         self._thread.join()
+
+    def has_ended(self):
+        self._thread.join(10)
+        return not self._thread.is_alive()
 
 
 def test_samples_hold_to_the_schema_and_have_all_that_unreal_asks_of_a_camera(udp):
@@ -181,3 +190,91 @@ def test_a_network_that_takes_nothing_is_told_and_the_others_are_served():
         while stream.getvalue().count("\n") < 4:
             time.sleep(0.01)
     assert len(sending.errors) >= 2
+
+
+@pytest.fixture
+def silent_names(monkeypatch):
+    """A resolver that says nothing about names; it answers as soon as the test sets what this gives."""
+    real, answers = socket.getaddrinfo, threading.Event()
+
+    def look_up(host, *arguments, flags=0, **more):
+        if not host[0].isdigit() and not flags & socket.AI_NUMERICHOST:
+            assert answers.wait(30)
+            host = "127.0.0.1"
+        return real(host, *arguments, flags=flags, **more)
+
+    monkeypatch.setattr(socket, "getaddrinfo", look_up)
+    yield answers
+    answers.set()
+
+
+def test_a_name_server_that_is_silent_holds_up_no_other_destination(udp, silent_names):
+    axes = "x y z pan tilt roll"
+    with listening() as by_address, listening() as by_name:
+        destinations = [
+            FreeD(udp, "renderer", port_of(by_name), axes),
+            FreeD(udp, "127.0.0.1", port_of(by_address), axes),
+        ]
+        with Sending(destinations) as sending:
+            # Fifty moments of two cameras; before, the first look-up was waited for.
+            for _ in range(100):
+                by_address.recv(64)
+            while not sending.errors:
+                time.sleep(0.01)
+            silent_names.set()
+            assert freed_packet(by_name.recv(64))[0] in (1, 2)
+    assert str(sending.errors[0]) == "renderer cannot be looked up: the name server is silent"
+
+
+def test_a_name_is_looked_up_beside_the_sending_and_the_last_answer_holds(monkeypatch):
+    monkeypatch.setattr(host_lookup, "LOOK_UP_AGAIN_S", 0.01)
+    asked = []
+
+    def look_up(host, port, flags=0, **_):
+        if flags & socket.AI_NUMERICHOST:
+            raise socket.gaierror("not an address")
+        asked.append(threading.current_thread())
+        if len(asked) == 2:
+            raise socket.gaierror("no answer")
+        return [(socket.AF_INET, None, None, None, (f"10.0.0.{min(len(asked), 3)}", port))]
+
+    monkeypatch.setattr(host_lookup, "FAILED_AGAIN_S", 0.01)
+    monkeypatch.setattr(socket, "getaddrinfo", look_up)
+    lookup, seen = HostLookup("renderer", 40000), []
+    while not seen or seen[-1][1][0] != "10.0.0.3":
+        if (address := lookup.address()) is not None:
+            seen.append(address)
+    lookup.close()
+    assert {address[0] for _, address in seen} <= {"10.0.0.1", "10.0.0.3"}
+    assert threading.current_thread() not in asked
+
+
+@pytest.fixture
+def pipe():
+    reads, writes = os.pipe()
+    with os.fdopen(reads) as reader, suppress(BrokenPipeError), os.fdopen(writes, "w") as writer:
+        yield reader, writer
+
+
+def test_a_program_that_reads_lines_no_more_ends_the_sending_if_it_was_alone(pipe):
+    reader, writer = pipe
+    with Sending([JsonLines(writer)]) as sending:
+        assert json.loads(reader.readline())["number"] == 0
+        reader.close()
+        assert sending.has_ended()
+    assert sending.errors == []
+
+
+def test_a_program_that_reads_lines_no_more_or_slowly_holds_up_no_renderer(pipe, udp):
+    reader, writer = pipe
+    with listening() as opened:
+        renderer = FreeD(udp, "127.0.0.1", port_of(opened), "x y z pan tilt roll")
+        with Sending([JsonLines(writer), renderer]) as sending:
+            while not sending.errors:
+                opened.recv(64)
+            opened.recv(64)
+            reader.close()
+            while not isinstance(sending.errors[-1], BrokenPipeError):
+                opened.recv(64)
+            opened.recv(64)
+    assert str(sending.errors[0]) == "the program that reads the lines does not keep up"

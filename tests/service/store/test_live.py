@@ -50,8 +50,16 @@ def time_passes(stock, **time):
             name: {what: (datetime.fromisoformat(at) - by).isoformat() for what, at in one.items()}
             for name, one in row.watched.items()
         }
-        moments = {"reported_at": row.reported_at - by, "alarm_due_at": row.alarm_due_at and row.alarm_due_at - by}
+        document = earlier(row.document, by) | {"others": [earlier(one, by) for one in row.document["others"]]}
+        due_at = row.alarm_due_at and row.alarm_due_at - by
+        moments = {"document": document, "reported_at": row.reported_at - by, "alarm_due_at": due_at}
         connection.execute(sa.update(tables.live_reports).values(watched=watched, **moments))
+
+
+def earlier(sender, by):
+    """What is stored of a process, so much earlier."""
+    moments = {"first_at", "reported_at"} & sender.keys()
+    return sender | {what: (datetime.fromisoformat(sender[what]) - by).isoformat() for what in moments}
 
 
 def rings(stock):
@@ -151,6 +159,62 @@ def test_a_process_that_is_not_heard_of_rings_unless_it_was_told_to_end(watched)
     told(watched, stopped=True)
     time_passes(watched, seconds=31)
     assert rings(watched) == []
+
+
+def of(process, **more):
+    """What a report says of its process."""
+    return {"host": f"host-{process}", "pid": 1, **more}
+
+
+def test_one_of_two_processes_is_missed_though_the_other_reports_or_ends_in_order(watched):
+    for process in ("a", "b", "a"):
+        told(watched, **of(process))
+    assert [(one.host, one.running) for one in watched.live.state("v").others] == [("host-b", True)]
+    time_passes(watched, seconds=31)
+    told(watched, **of("b"))
+    assert rings(watched) == [("live-silent", None)]
+    assert "on host-a" in watched.venues.health("v").alarms[0].why
+    assert [(one.host, one.running) for one in watched.live.state("v").others] == [("host-a", False)]
+    told(watched, **of("b", stopped=True))
+    assert rings(watched) == [("live-silent", None)]
+    told(watched, **of("a"))
+    assert rings(watched) == []
+    told(watched, **of("a", stopped=True))
+    time_passes(watched, seconds=31)
+    assert (rings(watched), watched.live.state("v").others) == ([], [])
+
+
+def test_a_process_does_not_hide_that_another_one_does_not_measure(watched):
+    blind, stored = camera(status="coasted", measured=0, coasted=12), camera(status="stored", stream=None, measured=0)
+    for process, reported in (("a", blind), ("b", stored), ("a", blind)):
+        told(watched, reported, **of(process))
+    time_passes(watched, seconds=11)
+    told(watched, blind, **of("a"))
+    told(watched, stored, **of("b"))
+    assert rings(watched) == [("live-not-measured", "left")]
+
+
+def test_a_process_that_takes_the_place_of_one_that_died_is_the_only_one_that_is_missed(watched):
+    told(watched, **of("a", started_at="2026-11-23T10:00:00Z"))
+    time_passes(watched, seconds=3)
+    for _ in range(2):
+        told(watched, **of("a", started_at="2026-11-23T11:00:00Z"))
+        assert watched.live.state("v").others == []
+        time_passes(watched, seconds=29)
+    told(watched, **of("a", started_at="2026-11-23T11:00:00Z"))
+    assert rings(watched) == []
+    told(watched, **of("a", started_at="2026-11-23T11:00:00Z", stopped=True))
+    time_passes(watched, seconds=31)
+    assert rings(watched) == []
+
+
+def test_a_process_that_is_missed_for_a_day_is_missed_no_more(watched):
+    for process in ("a", "b", "a"):
+        told(watched, **of(process))
+    for hours in (0, 25):
+        time_passes(watched, hours=hours)
+        told(watched, **of("b"))
+    assert (rings(watched), watched.live.state("v").others) == ([], [])
 
 
 def test_prometheus_reads_whether_it_runs_what_is_measured_and_how_late_poses_are(stock):

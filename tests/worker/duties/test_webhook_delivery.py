@@ -19,7 +19,7 @@ from service.store.events.outbox import AT_ONCE_PER_RECEIVER
 from service.store.jobs.queries import JobPage
 from tests.homes import in_both_homes
 from tests.worker.certificates import certificate
-from tests.worker.receiver import Dripping, Endless, Receiver, Silent, Talkative
+from tests.worker.receiver import TELLTALE, Dripping, Endless, Receiver, Silent, Talkative, Telltale
 from tests.worker.stock import Stock, anyway
 from worker.duties import outbound_guard, webhook_request
 from worker.duties.webhook_delivery import AT_ONCE, ATTEMPT, WebhookDelivery
@@ -413,6 +413,18 @@ def test_no_receiver_holds_a_sender_longer_than_the_limit(stock, receiver, clock
     look(callbacks(home, clock))
     assert time.monotonic() - begun < 60
     assert (len(hook.received), home.callbacks()) == (1, {"waiting": 1})
+
+
+@pytest.mark.parametrize("says", TELLTALE)
+def test_nothing_that_a_receiver_says_is_read_through_a_callback(stock, receiver, clock, says):
+    home, hook = stock(), receiver(Telltale)
+    hook.says = says
+    job = ended(home, hook.url)
+    look(callbacks(home, clock))
+    error = home.jobs.get(job).callback.last_error
+    assert hook.received
+    assert "hunter2" not in (error or "")
+    assert "bytearray" not in (error or "")
 
 
 def test_an_endless_answer_is_broken_off(stock, receiver, clock):

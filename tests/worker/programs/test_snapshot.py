@@ -7,6 +7,7 @@ import sys
 import threading
 import time
 from base64 import b64encode
+from contextlib import suppress
 from fractions import Fraction
 
 import av
@@ -21,6 +22,7 @@ from service.schemas.venue import VenueIn
 from service.settings import Settings
 from tests.e2e.running import venue
 from tests.worker.certificates import certificate
+from tests.worker.receiver import TELLTALE
 from tests.worker.sources.streaming_camera import ASKS, SIZE, Film, Stranger, StreamingCamera
 from worker.sources.rtsp_relay import Relay
 
@@ -225,3 +227,22 @@ def test_a_stream_that_is_joined_in_the_middle_gives_a_frame_after_it_has_become
     frame = taken(tmp_path, f"rtsp://***@{seen.host}/live", RIGHT)
     picture = cv2.imdecode(np.frombuffer(frame, np.uint8), cv2.IMREAD_COLOR)
     assert min(np.abs(picture.astype(int) - with_bar(number)).mean() for number in range(120)) < 8
+
+
+@pytest.mark.parametrize("says", TELLTALE)
+@pytest.mark.parametrize("userinfo", [None, RIGHT])
+def test_nothing_that_the_host_of_a_source_says_is_read_through_its_refusal(tmp_path, says, userinfo):
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+
+        def answer():
+            with suppress(OSError):
+                while True:
+                    connection, _ = listener.accept()
+                    with connection:
+                        connection.recv(4096)
+                        connection.sendall(says)
+
+        threading.Thread(target=answer, daemon=True).start()
+        detail = refused(tmp_path, "http://{}:{}/picture".format(*listener.getsockname()), userinfo)
+    assert "hunter2" not in detail
+    assert "bytearray" not in detail

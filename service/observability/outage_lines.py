@@ -1,0 +1,90 @@
+"""Lines of the log about a database or bucket that is away: one a minute for each thing that fails, without tracebacks.
+
+While a database is away everything that needs it fails, some things many times a second, and always in the same place:
+a traceback says nothing that the first line of the error does not.
+"""
+
+from __future__ import annotations
+
+import logging
+import sys
+import threading
+import time
+from collections.abc import MutableMapping
+from typing import Any
+
+import structlog
+
+EVERY_S = 60.0
+# Of drivers and of what keeps connections, which other libraries log as they come: a test of the type would load them.
+OF_DRIVERS = ("psycopg", "psycopg_pool", "sqlite3", "sqlalchemy")
+DRIVER_OUTAGES = ("OperationalError", "InterfaceError", "InternalError", "TimeoutError", "PoolTimeout")
+
+
+class OutageLines:
+    """Lets one line a minute through for each event and kind of outage; the next one says how many were left out."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._next_s: dict[tuple[str, str], float] = {}
+        self._left_out: dict[tuple[str, str], int] = {}
+
+    def structured(self, _: Any, __: str, line: MutableMapping[str, Any]) -> MutableMapping[str, Any]:
+        """Shorten a line of structlog, or drop it: a processor."""
+        error = _error_in(line.get("exc_info"))
+        if error is not None and _is_outage(error):
+            left_out = self._left_out_before(str(line["event"]), error)
+            if left_out is None:
+                raise structlog.DropEvent
+            del line["exc_info"]
+            line.update(_in_words(error, left_out))
+        return line
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        """Shorten a line of the standard library, or drop it: a filter of a handler."""
+        error = _error_in(record.exc_info)
+        if error is not None and _is_outage(error):
+            # Without its arguments: those are another job's each time.
+            left_out = self._left_out_before(f"{record.name} {record.msg}", error)
+            if left_out is None:
+                return False
+            record.exc_info = record.exc_text = None
+            words = ", ".join(f"{name}: {value}" for name, value in _in_words(error, left_out).items())
+            record.msg, record.args = f"{record.getMessage()} ({words})", ()
+        return True
+
+    def _left_out_before(self, event: str, error: BaseException) -> int | None:
+        """Return how many such lines were left out since the last one; None: this one is left out as well."""
+        key, now = (event, type(error).__name__), time.monotonic()
+        with self._lock:
+            if now < self._next_s.get(key, now):
+                self._left_out[key] = self._left_out.get(key, 0) + 1
+                return None
+            self._next_s[key] = now + EVERY_S
+            return self._left_out.pop(key, 0)
+
+
+def _error_in(exc_info: Any) -> BaseException | None:
+    match exc_info:
+        case BaseException():
+            return exc_info
+        case (_, BaseException() as error, _):
+            return error
+        case True:
+            return sys.exc_info()[1]
+        case _:
+            return None
+
+
+def _is_outage(error: BaseException) -> bool:
+    if type(error).__module__.partition(".")[0] in OF_DRIVERS:
+        return any(kind.__name__ in DRIVER_OUTAGES for kind in type(error).__mro__)
+    # What is installed for the client alone has no bucket.
+    blobs = sys.modules.get("service.store.blobs")
+    return blobs is not None and isinstance(error, blobs.BLOB_OUTAGES)
+
+
+def _in_words(error: BaseException, left_out: int) -> dict[str, Any]:
+    first_line = (str(error).splitlines() or [""])[0]
+    words: dict[str, Any] = {"error": f"{type(error).__name__}: {first_line}"}
+    return {**words, "left_out": left_out} if left_out else words
