@@ -26,12 +26,13 @@ from tests.benchmarks.nights.single import LEAST_WRONG_M
 from tests.benchmarks.truth import apart
 from tests.demo.render import outdated
 from worker.calibration.calibrate import calibrate
-from worker.calibration.find_cameras import find_cameras
+from worker.calibration.find_cameras import find_cameras, why_lens_unfit
 from worker.calibration.gate.quality import CameraResult
 from worker.calibration.geometry.camera import Camera, Frame
 from worker.calibration.geometry.field import Field
 from worker.calibration.memory.camera_memory import CameraMemory
 from worker.calibration.records import Options
+from worker.calibration.refinement.diagnosis import find_suspicions
 from worker.calibration.refinement.refine import refine
 from worker.calibration.relocalisation.sought import SoughtCamera, SoughtLens
 
@@ -119,8 +120,12 @@ def _measured(focal: float, view: str, too_long: float) -> list[Answer]:
     found, sight = begun.with_pose(aside), tonight()
     for _ in range(3):
         (found,) = refine(PITCH, [found], sight, 0.5, stored=[found]).cameras
+    finished = refine(PITCH, [found], sight, 0.5, stored=[found])
     (result,) = Installation(PITCH, [found]).night(sight)
-    return [Answer.of(result, real), *_later(found, real, night)] if result.accepted else [Answer.of(result, real)]
+    doubts = find_suspicions(finished.deviations)
+    is_found = result.accepted and why_lens_unfit(result, doubts) is None
+    answer = replace(Answer.of(result, real), accepted=is_found)
+    return [answer, *_later(found, real, night)] if is_found else [answer]
 
 
 def _rendered(focal: float, view: str, too_long: float) -> list[Answer]:

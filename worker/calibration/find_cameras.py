@@ -18,7 +18,9 @@ from worker.calibration.gate.quality import CameraResult, Gate
 from worker.calibration.geometry.camera import Camera, Frame
 from worker.calibration.geometry.field import Field
 from worker.calibration.records import Calibration, Options, Progress, ProgressReporter, Segment, StageTimings
+from worker.calibration.refinement.diagnosis import Suspicion
 from worker.calibration.refinement.refine import Observations
+from worker.calibration.refinement.uncertainty import FOCAL
 from worker.calibration.relocalisation.candidate import Candidate
 from worker.calibration.relocalisation.crown import find_crown
 from worker.calibration.relocalisation.field_halves import choose_sides, side_of
@@ -261,6 +263,8 @@ def _judged(sought: SoughtCamera, found: Relocalisation, calibrated: Calibration
         return FoundCamera(sought.id, found.candidates, found.refusal, found.remarks)
     (result,) = (one for one in calibrated.cameras if one.camera.id == sought.id)
     words = why_not_confirmed(result, is_lens_found=sought.is_lens_sought)
+    if words is None and not sought.is_lens_sought:
+        words = why_lens_unfit(result, calibrated.suspicions)
     if words is not None:
         return FoundCamera(sought.id, found.candidates, NotFound("not-confirmed", words), found.remarks)
     best, *others = found.candidates
@@ -286,3 +290,31 @@ def why_not_confirmed(result: CameraResult, *, is_lens_found: bool) -> str | Non
             "lens is, if it is known"
         )
     return None
+
+
+def why_lens_unfit(result: CameraResult, suspicions: Sequence[Suspicion]) -> str | None:
+    """What speaks against a lens that was given for a camera that was found through it, in words; None if nothing.
+
+    A job has a stored pose beside the lens. A search has nothing but the lines, and what it finds is stored.
+    """
+    gate, focal_px = Gate(), result.camera.intrinsics.focal_length_px
+    assert result.sigma is not None
+    for one in suspicions:
+        away_m = 0.0 if result.refined is None else _apart_m(result.camera, result.refined.camera)
+        if (one.camera, one.quantity) == (result.camera.id, FOCAL) and away_m > gate.largest_zoomed_m:
+            by = f"{abs(one.deviation) / focal_px:.2%} ± {one.sigma / focal_px:.2%}"
+            return (
+                f"the lines fit a focal length {by} {'longer' if one.deviation > 0 else 'shorter'} than that of the lens "
+                f"that was given, which puts the camera {away_m:.2f} m from where it seems to be; leave the lens out, "
+                "or give one that was measured"
+            )
+    if result.sigma.position_m > gate.largest_found_sigma_m:
+        return (
+            f"how far off the lens may be that was given leaves open where the camera stands: {result.sigma.position_m:.2f} "
+            f"m (at most {gate.largest_found_sigma_m} allowed); say how well it is known (sigma), or leave it out"
+        )
+    return None
+
+
+def _apart_m(one: Camera, other: Camera) -> float:
+    return float(np.linalg.norm(one.pose.position - other.pose.position))

@@ -30,7 +30,9 @@ class Gate:
 
     `least_agreement`: right poses find 0.8 and more of the lines beyond chance on fields of every kind, poses that have
     settled on other lines up to 0.5. `residual_floor_px`: of the frame itself; lines of a small frame are no sharper.
-    `largest_sigma_deg`: a principal point that is off turns a camera by as much and harms nothing. `largest_zoomed_m`:
+    `largest_ground_sigma_m`: of where markings are put on the ground, which is what poses are used for; pose and lens
+    of a long view may be off by metres along it, and make up for each other. `largest_found_sigma_m`: of a first
+    position through a lens that was given. `largest_sigma_deg`: a principal point that is off turns a camera by as much and harms nothing. `largest_zoomed_m`:
     how far from here a camera may be whose focal length the lines contradict.
     """
 
@@ -39,7 +41,8 @@ class Gate:
     largest_residual_px: float = 2.4
     residual_floor_px: float = 1.2
     largest_sigma_deg: float = 1.5
-    largest_sigma_m: float = 0.5
+    largest_ground_sigma_m: float = 0.3
+    largest_found_sigma_m: float = 0.3
     largest_zoomed_m: float = 0.2
     largest_rotation_deg: float = 8.0
     largest_shift_m: float = 1.5
@@ -218,13 +221,14 @@ def alone_rejection(result: CameraResult, gate: Gate) -> Refusal | None:
             f"{zoom_in_words(result.camera, result.zoom)}, which puts the camera {result.zoom_shift_m:.2f} m from "
             "where it seems to be: zoom or focus have moved, or the lens is not this one; calibrate the lens again",
         )
-    sigma = result.sigma
-    if sigma.rotation_deg > gate.largest_sigma_deg or sigma.position_m > gate.largest_sigma_m:
+    ground_m = result.sigma.position_m if result.ground_sigma_m is None else result.ground_sigma_m
+    if result.sigma.rotation_deg > gate.largest_sigma_deg or ground_m > gate.largest_ground_sigma_m:
         return Refusal(
             "undetermined",
-            f"the visible lines do not determine the pose: sigma {sigma.rotation_deg:.2f} degrees (at most "
-            f"{gate.largest_sigma_deg} allowed), {sigma.position_m:.2f} m (at most {gate.largest_sigma_m}); let the "
-            "camera see lines in more than one direction, or calibrate its lens again",
+            f"the visible lines do not determine the pose: sigma {result.sigma.rotation_deg:.2f} degrees (at most "
+            f"{gate.largest_sigma_deg} allowed), {ground_m:.2f} m at the markings in view (at most "
+            f"{gate.largest_ground_sigma_m}); let the camera see lines in more than one direction, or calibrate its "
+            "lens again",
         )
     beaten_by_any = seen.agreement < 1 - gate.agreement_loss
     if beaten_by_any and seen.agreement < (before := result.evidence_before()).agreement - gate.agreement_loss:

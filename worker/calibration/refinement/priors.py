@@ -40,7 +40,7 @@ MOVEMENT_SCALES: Array = 0.3 * 2.0 ** np.arange(7.0)
 FOCAL_SCALES: Array = 2.0 ** np.arange(8.0)
 """A focal length is off by what is expected of it, or by so many times more; never by less: lines that fit say little
 of it. A zoom ring moves it by far more than that, ..."""
-UNSTATED_ODDS, STATED_ODDS = FOCAL_SCALES**-0.5, FOCAL_SCALES**-3.0
+UNSTATED_ODDS, STATED_ODDS = FOCAL_SCALES**0.0, FOCAL_SCALES**-3.0
 """Odds of these scales for a lens before any line. Twice as far off is half as likely where nobody said how far it may
 be off, so that there is no scale by which it surely is not; a sigma that was said is wrong twofold one time in nine."""
 LENS_SCALES: Array = 2.0 ** np.arange(6.0)
@@ -67,7 +67,8 @@ class Priors:
     """`mixing` (D, A) and `blocks` of A independent errors; `unknowns` of all views.
 
     `movements` (W,): which of the errors are movements of a camera, and `free` (W,) how far it may have moved if
-    nothing is known of it; `changes`: by camera with a memory, see `changes_of`.
+    nothing is known of it; `changes`: by camera with a memory, see `changes_of`; `lasting` (L,): those of lens and
+    field that have been the same since poses were stored.
     """
 
     unknowns: Unknowns
@@ -76,6 +77,7 @@ class Priors:
     movements: NDArray[np.intp]
     free: Array
     changes: dict[str, NDArray[np.intp]]
+    lasting: NDArray[np.intp]
 
     def changes_of(self, camera: str) -> NDArray[np.intp]:
         """Which of the errors are changes of a camera's focal length since the first nights of its memory."""
@@ -149,7 +151,9 @@ class _Errors:
         """All of them."""
         moved = np.concatenate([group.which for group in self._movements])
         free = np.tile(FREE, len(moved) // POSE_NUMBERS)
-        return Priors(self._unknowns, np.stack(self._columns, axis=1), self._blocks, moved, free, self._changes)
+        lasting = np.concatenate([np.empty(0, dtype=np.intp), *(group.which for group in self._lasting)])
+        mixing = np.stack(self._columns, axis=1)
+        return Priors(self._unknowns, mixing, self._blocks, moved, free, self._changes, lasting)
 
     def add_solved(self, values: Array) -> None:
         """What the finish has found along with the poses: it stands at `values` (E,) from what was given."""

@@ -9,7 +9,7 @@ from the poses that are answered belongs to their error.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 from functools import partial
 
@@ -19,8 +19,9 @@ from fields.template import TURF_M
 from worker.calibration.detection.evidence import Evidence
 from worker.calibration.detection.line_measurement import Measurements
 from worker.calibration.geometry.camera import Array, Camera
-from worker.calibration.geometry.derivatives import POSE_NUMBERS, moved
+from worker.calibration.geometry.derivatives import POSE_NUMBERS, moved, pixel_slopes_of_all
 from worker.calibration.geometry.field import Field
+from worker.calibration.geometry.lens import LENS_NUMBERS
 from worker.calibration.geometry.parameters import (
     HEAT_FOCAL,
     LensParameter,
@@ -29,6 +30,7 @@ from worker.calibration.geometry.parameters import (
     with_focal_length,
     with_lens_changed,
 )
+from worker.calibration.geometry.visibility import VisibleLines
 from worker.calibration.memory.camera_memory import CameraMemory
 from worker.calibration.refinement.cross_check import CrossCheck, CrossChecks
 from worker.calibration.refinement.estimate import Estimate
@@ -40,6 +42,12 @@ from worker.calibration.refinement.variance_components import Posterior, posteri
 
 SURE_CHANGE = 3.0
 """A focal length has changed when it differs by so many times its sigma and what heat does together."""
+FOCAL = "focal_length_px"
+WORST_MARKINGS = 0.95
+"""Of the line points in view so many are put nearer to their places than the worst: a last one at the rim of the picture
+is none that anybody measures at."""
+ASKED_MARKINGS = 200
+"""Line points that are asked."""
 ASKED_AGAIN = 2
 """How often lines are weighed again by where everything seems to be by then."""
 
@@ -132,9 +140,10 @@ class RefinedPose:
     `evidence`: how much of the expected lines is seen. None where fewer than `FEWEST_MEASUREMENTS` points were
     measured: `residual_px`, the rms offset of its lines in px of its own frame; `covariance` (6, 6) of (rotation in the
     camera's frame rad, position in the world m), with what lens, field and ground may be off; and `repeatability`, the
-    part of sigma that another night's frames would draw anew. `zoom`: how much longer than given the lines have the
-    focal length, None where it was solved for; `with_fitted_zoom`: the camera with that focal length, and the pose that
-    goes with it. `refined`: pose and all of the lens as the lines have them. `lens_change`: of the focal length since
+    part of sigma that another night's frames would draw anew. `ground_sigma_m`: how far from their places on the ground
+    the markings in view may be put by pose and lens, the worst of them, one standard deviation, m. `zoom`: how much
+    longer than the stored one the focal length is since that pose was stored, None where it was solved for;
+    `with_fitted_zoom`: the camera with that focal length, and the pose that goes with it. `refined`: pose and all of the lens as the lines have them. `lens_change`: of the focal length since
     the camera's memory began, None without a memory. `cross_checked`: computes the cross-check, lazily, since only the
     answer that is kept is asked. `measured`: the line measurements; `repainted_markings`: numbers of the markings that
     lie elsewhere than a memory has them, and were left out; `uneven_m`: standard deviation of the ground's heights.
@@ -147,6 +156,7 @@ class RefinedPose:
     repeatability: Sigma | None
     zoom: Deviation | None
     with_fitted_zoom: Camera | None
+    ground_sigma_m: float | None = field(default=None, kw_only=True)
     refined: PoseAndLens | None = field(default=None, kw_only=True)
     lens_change: LensChange | None = field(default=None, kw_only=True)
     cross_checked: Callable[[], CrossCheck | None] = field(default=_not_cross_checked, kw_only=True)
@@ -300,7 +310,7 @@ class _Judgement:
             (pose @ one @ pose.T for one in (self.by_lines, self.covariance)),
             key=lambda one: float(np.trace(one[3:, 3:])),
         )
-        zoom = next((d for d in self._of_lens(number, solved) if d.name == "focal_length_px"), None)
+        zoom, errors = self._zoom(number, solved)
         own = slice(POSE_NUMBERS * number, POSE_NUMBERS * (number + 1))
         return RefinedPose(
             camera,
@@ -309,12 +319,57 @@ class _Judgement:
             covariance + np.outer(away, away),
             Sigma.from_covariance(self.repeated[own, own]),
             zoom,
-            None if zoom is None else moved(with_focal_length(camera, zoom.value), away),
+            None if zoom is None else moved(with_focal_length(camera, zoom.value), pose @ errors),
+            ground_sigma_m=self._ground_sigma_m(camera, np.concatenate([pose, lens])),
             refined=self._refined(camera, pose, lens),
             lens_change=None if memory is None else self._lens_change(camera, memory),
             cross_checked=partial(checks.of, number),
             uneven_m=self.here.uneven_m,
         )
+
+    def _since_stored(self) -> Array:
+        """The errors (A,), with those of lens and field as they were expected: what has happened since."""
+        since, lasting = self.value.copy(), self.believed.lasting
+        since[lasting] = self.found.mean[lasting]
+        return since
+
+    def _zoom(self, number: int, solved: Unknowns) -> tuple[Deviation | None, Array]:
+        """How much longer than the stored one the focal length of a camera is since, and the errors (A,) that go with it.
+
+        A lens that was wrong when the pose was stored is wrong by as much tonight, and is no zoom; nor is one that was
+        put right since. So it is what has happened since, or all that it is off, whichever is less. None where the
+        focal length was solved for.
+        """
+        off = next((d for d in self._of_lens(number, solved) if d.name == FOCAL), None)
+        since = self._since_stored()
+        row = self.believed.lens_tonight(number)[LENS_NUMBERS.index(FOCAL)]
+        longer_px = float(row @ since)
+        if off is None or abs(off.value) <= abs(longer_px):
+            return off, self.value
+        varies = row.copy()
+        varies[self.believed.lasting] = 0.0
+        return replace(off, value=longer_px, sigma=float(np.sqrt(varies @ self.covariance @ varies))), since
+
+    def _ground_sigma_m(self, camera: Camera, both: Array) -> float | None:
+        """How far off on the ground the worst marking in view may be put, by `both` (12, A), pose and lens together.
+
+        They may each be off by far more, and make up for each other. None where no marking is in view.
+        """
+        points = VisibleLines.from_camera(self.here.lines, camera).points.position
+        if len(points) == 0:
+            return None
+        points = points[:: max(len(points) // ASKED_MARKINGS, 1)]
+        slopes = pixel_slopes_of_all(camera, points)
+        by_ground = -slopes[..., 3:5]
+        away = both @ self.value
+        worst = 0.0
+        for covariance in (self.by_lines, self.covariance):
+            off = both @ covariance @ both.T + np.outer(away, away)
+            pixels = slopes @ off @ slopes.transpose(0, 2, 1)
+            inverse = np.linalg.pinv(by_ground)
+            ground = np.trace(inverse @ pixels @ inverse.transpose(0, 2, 1), axis1=1, axis2=2)
+            worst = max(worst, float(np.sqrt(np.quantile(ground, WORST_MARKINGS))))
+        return worst
 
     def _refined(self, camera: Camera, pose: Array, lens: Array) -> PoseAndLens:
         both = np.concatenate([pose, lens])

@@ -221,7 +221,7 @@ def test_a_lone_touchline_neither_lets_a_camera_run_away_nor_makes_it_sure(disto
     refined = refine(CROWNED, [moved(one, by=(0.2, 0.0, 0.0))], sight, 0.5)
     assert refined.each[0].residual_px is not None
     assert np.linalg.norm(refined.cameras[0].pose.position - one.pose.position) < 1.5
-    assert refined.each[0].sigma.position_m > Gate().largest_sigma_m
+    assert refined.each[0].sigma.position_m > Gate().largest_ground_sigma_m
 
 
 @pytest.mark.parametrize("colour", [0, 2])
