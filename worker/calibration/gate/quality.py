@@ -41,7 +41,7 @@ class Gate:
     largest_residual_px: float = 2.4
     residual_floor_px: float = 1.2
     largest_sigma_deg: float = 1.5
-    largest_ground_sigma_m: float = 0.3
+    largest_ground_sigma_m: float = 0.6
     largest_found_sigma_m: float = 0.3
     largest_zoomed_m: float = 0.2
     largest_rotation_deg: float = 8.0
