@@ -304,14 +304,15 @@ def why_lens_unfit(result: CameraResult, suspicions: Sequence[Suspicion]) -> str
         if (one.camera, one.quantity) == (result.camera.id, FOCAL) and away_m > gate.largest_zoomed_m:
             by = f"{abs(one.deviation) / focal_px:.2%} ± {one.sigma / focal_px:.2%}"
             return (
-                f"the lines fit a focal length {by} {'longer' if one.deviation > 0 else 'shorter'} than that of the lens "
-                f"that was given, which puts the camera {away_m:.2f} m from where it seems to be; leave the lens out, "
-                "or give one that was measured"
+                f"the lines fit a focal length {by} {'longer' if one.deviation > 0 else 'shorter'} than that of the "
+                f"lens that was given, which puts the camera {away_m:.2f} m from where it seems to be; leave the lens "
+                "out, or give one that was measured"
             )
     if result.sigma.position_m > gate.largest_found_sigma_m:
         return (
-            f"how far off the lens may be that was given leaves open where the camera stands: {result.sigma.position_m:.2f} "
-            f"m (at most {gate.largest_found_sigma_m} allowed); say how well it is known (sigma), or leave it out"
+            "how far off the lens may be that was given leaves open where the camera stands: "
+            f"{result.sigma.position_m:.2f} m (at most {gate.largest_found_sigma_m} allowed); say how well it is known "
+            "(sigma), or leave it out"
         )
     return None
 

@@ -8,12 +8,14 @@ import pytest
 
 from tests.worker.calibration import synthetic
 from tests.worker.calibration.gate.test_quality import good
-from tests.worker.calibration.synthetic import CROWNED, PITCH, paint_frame, pair, pair_frames, worn
+from tests.worker.calibration.synthetic import CROWNED, PITCH, moved, paint_frame, pair, pair_frames, worn
 from tests.worker.calibration.test_calibrate import white_on_green
-from worker.calibration.find_cameras import FoundCamera, find_cameras, why_not_confirmed
+from worker.calibration.find_cameras import FoundCamera, find_cameras, why_lens_unfit, why_not_confirmed
 from worker.calibration.gate.quality import Gate
 from worker.calibration.geometry.rotation import rotation_angles_deg
 from worker.calibration.records import Stopped
+from worker.calibration.refinement.diagnosis import find_suspicions
+from worker.calibration.refinement.uncertainty import Deviation, PoseAndLens
 from worker.calibration.relocalisation.relocalise import NotFound
 from worker.calibration.relocalisation.sought import Place, SoughtCamera, SoughtLens
 
@@ -126,3 +128,19 @@ def test_a_calibration_begins_with_what_was_found_and_may_not_confirm_it(reason,
 def test_who_is_asked_to_stop_stops():
     with pytest.raises(Stopped):
         find_cameras(CROWNED, [sought(pair()[0])], [], frames(), white_on_green, 1, stop=lambda: True)
+
+
+def test_a_lens_that_was_given_and_does_not_fit_is_said_and_nothing_is_found():
+    lens = {"name": "focal_length_px", "value": -12.0, "sigma": 1.2, "expected": 0.5}
+    result = replace(good(), refined=PoseAndLens(moved(good().camera, by=(1.2, 0.0, 0.0)), np.eye(12)))
+    doubts = find_suspicions([Deviation(result.camera.id, **lens)])
+    assert why_lens_unfit(result, []) is None
+    assert why_lens_unfit(result, find_suspicions([Deviation("another", **lens)])) is None
+    told = why_lens_unfit(result, doubts)
+    assert "a focal length 2.00% ± 0.20% shorter than that of the lens that was given" in told
+    assert "1.20 m from where it seems to be; leave the lens out" in told
+
+
+def test_a_lens_that_may_be_off_by_more_than_a_first_position_says_so():
+    loose = replace(good(), covariance=np.diag([1e-4**2] * 3 + [0.3**2] * 3), ground_sigma_m=0.1)
+    assert "say how well it is known (sigma)" in why_lens_unfit(loose, [])

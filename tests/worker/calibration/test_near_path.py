@@ -159,3 +159,16 @@ def test_nobody_is_told_of_looking_nearby_in_vain():
     frames = {one.id: [frame] for one, frame in zip(pair(), pair_frames(), strict=True)}
     calibrate(CROWNED, started, frames, white_on_green, Options(seed=5, generations=10), steps.append)
     assert list(dict.fromkeys(step.stage for step in steps)) == ["segmentation", "evolution", "refinement"]
+
+
+def test_the_same_frames_sent_again_change_nothing():
+    frames = {one.id: [frame] for one, frame in zip(pair(), pair_frames(), strict=True)}
+    first = again = nearby()
+    for _ in range(2):
+        stored = [one.camera for one in again.cameras]
+        again = calibrate(CROWNED, stored, frames, white_on_green, Options(seed=5), memories=again.memories)
+        assert again.accepted
+        for one, other in zip(first.cameras, again.cameras, strict=True):
+            assert np.linalg.norm(one.camera.pose.position - other.camera.pose.position) < 5e-4
+            assert other.sigma.position_m > 0.95 * one.sigma.position_m
+            assert again.memories[one.camera.id].jobs == 1

@@ -32,15 +32,14 @@ class Gate:
     settled on other lines up to 0.5. `residual_floor_px`: of the frame itself; lines of a small frame are no sharper.
     `largest_ground_sigma_m`: of where markings are put on the ground, which is what poses are used for; pose and lens
     of a long view may be off by metres along it, and make up for each other. `largest_found_sigma_m`: of a first
-    position through a lens that was given. `largest_sigma_deg`: a principal point that is off turns a camera by as much and harms nothing. `largest_zoomed_m`:
-    how far from here a camera may be whose focal length the lines contradict.
+    position through a lens that was given. `largest_zoomed_m`: how far from here a camera may be whose focal length the
+    lines contradict.
     """
 
     least_agreement: float = 0.6
     agreement_loss: float = 0.1
     largest_residual_px: float = 2.4
     residual_floor_px: float = 1.2
-    largest_sigma_deg: float = 1.5
     largest_ground_sigma_m: float = 0.6
     largest_found_sigma_m: float = 0.3
     largest_zoomed_m: float = 0.2
@@ -222,13 +221,12 @@ def alone_rejection(result: CameraResult, gate: Gate) -> Refusal | None:
             "where it seems to be: zoom or focus have moved, or the lens is not this one; calibrate the lens again",
         )
     ground_m = result.sigma.position_m if result.ground_sigma_m is None else result.ground_sigma_m
-    if result.sigma.rotation_deg > gate.largest_sigma_deg or ground_m > gate.largest_ground_sigma_m:
+    if ground_m > gate.largest_ground_sigma_m:
         return Refusal(
             "undetermined",
-            f"the visible lines do not determine the pose: sigma {result.sigma.rotation_deg:.2f} degrees (at most "
-            f"{gate.largest_sigma_deg} allowed), {ground_m:.2f} m at the markings in view (at most "
-            f"{gate.largest_ground_sigma_m}); let the camera see lines in more than one direction, or calibrate its "
-            "lens again",
+            f"the visible lines do not determine the pose: what is in view may lie {ground_m:.2f} m from where it is "
+            f"put on the ground (sigma, at most {gate.largest_ground_sigma_m} m allowed); let the camera see lines in "
+            "more than one direction, or calibrate its lens again",
         )
     beaten_by_any = seen.agreement < 1 - gate.agreement_loss
     if beaten_by_any and seen.agreement < (before := result.evidence_before()).agreement - gate.agreement_loss:

@@ -41,8 +41,8 @@ FOCAL_SCALES: Array = 2.0 ** np.arange(8.0)
 """A focal length is off by what is expected of it, or by so many times more; never by less: lines that fit say little
 of it. A zoom ring moves it by far more than that, ..."""
 UNSTATED_ODDS, STATED_ODDS = FOCAL_SCALES**0.0, FOCAL_SCALES**-3.0
-"""Odds of these scales for a lens before any line. Twice as far off is half as likely where nobody said how far it may
-be off, so that there is no scale by which it surely is not; a sigma that was said is wrong twofold one time in nine."""
+"""Odds of these scales for a lens before any line: where nobody said how far it may be off, none is likelier than
+another; a sigma that was said is wrong twofold one time in nine."""
 LENS_SCALES: Array = 2.0 ** np.arange(6.0)
 """... and nothing moves the rest of a lens so far."""
 FIELD_SCALES: Array = 2.0 ** np.arange(-3.0, 5.0)

@@ -44,8 +44,8 @@ SURE_CHANGE = 3.0
 """A focal length has changed when it differs by so many times its sigma and what heat does together."""
 FOCAL = "focal_length_px"
 WORST_MARKINGS = 0.95
-"""Of the line points in view so many are put nearer to their places than the worst: a last one at the rim of the picture
-is none that anybody measures at."""
+"""Of the line points in view so many are put nearer to their places than the worst: nobody measures at the last one at
+the rim of the picture."""
 ASKED_MARKINGS = 200
 """Line points that are asked."""
 ASKED_AGAIN = 2
@@ -143,10 +143,11 @@ class RefinedPose:
     part of sigma that another night's frames would draw anew. `ground_sigma_m`: how far from their places on the ground
     the markings in view may be put by pose and lens, the worst of them, one standard deviation, m. `zoom`: how much
     longer than the stored one the focal length is since that pose was stored, None where it was solved for;
-    `with_fitted_zoom`: the camera with that focal length, and the pose that goes with it. `refined`: pose and all of the lens as the lines have them. `lens_change`: of the focal length since
-    the camera's memory began, None without a memory. `cross_checked`: computes the cross-check, lazily, since only the
-    answer that is kept is asked. `measured`: the line measurements; `repainted_markings`: numbers of the markings that
-    lie elsewhere than a memory has them, and were left out; `uneven_m`: standard deviation of the ground's heights.
+    `with_fitted_zoom`: the camera with that focal length, and the pose that goes with it. `refined`: pose and all of
+    the lens as the lines have them. `lens_change`: of the focal length since the camera's memory began, None without a
+    memory. `cross_checked`: computes the cross-check, lazily, since only the answer that is kept is asked. `measured`:
+    the line measurements; `repainted_markings`: numbers of the markings that lie elsewhere than a memory has them, and
+    were left out; `uneven_m`: standard deviation of the ground's heights.
     """
 
     camera: Camera
@@ -334,7 +335,7 @@ class _Judgement:
         return since
 
     def _zoom(self, number: int, solved: Unknowns) -> tuple[Deviation | None, Array]:
-        """How much longer than the stored one the focal length of a camera is since, and the errors (A,) that go with it.
+        """How much longer the focal length of a camera is since it was stored, and the errors (A,) that go with it.
 
         A lens that was wrong when the pose was stored is wrong by as much tonight, and is no zoom; nor is one that was
         put right since. So it is what has happened since, or all that it is off, whichever is less. None where the

@@ -11,12 +11,14 @@ from worker.calibration.detection.evidence import Evidence
 from worker.calibration.detection.line_measurement import Measurements
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.ground import Ground
+from worker.calibration.geometry.parameters import with_focal_length
 from worker.calibration.geometry.visibility import VisibleLines
+from worker.calibration.memory.camera_memory import AcceptedJob, CameraMemory
 from worker.calibration.refinement import priors
 from worker.calibration.refinement.estimate import Estimate, gauss_newton_step
 from worker.calibration.refinement.uncertainty import estimate_uncertainty
 from worker.calibration.refinement.unknowns import Unknowns
-from worker.calibration.robust import tukey_weights
+from worker.calibration.robust import huber_weights, tukey_weights
 
 pytestmark = pytest.mark.slow
 
@@ -56,11 +58,11 @@ def test_errors_as_large_as_expected_spread_poses_as_far_as_is_said():
     assert np.mean(said) == pytest.approx(spread, rel=0.15)
 
 
-def said_of_a_corner(**sigma):
+def said_of_a_corner(sigma_from=None, **sigma):
     """How sure (m) a long camera is that moved and now sees one corner of a court, its lens known so well."""
     court = Field(40.0, 20.0, 0.05, template=load("handball"))
     one = camera("left", (-9.0, -35.0, 9.0), (-20.0, 10.0), focal=3000.0)
-    one = one.with_lens(replace(one.intrinsics, sigma=sigma))
+    one = one.with_lens(replace(one.intrinsics, sigma=sigma, sigma_from=sigma_from))
     lines = court.line_points()
     unknowns = Unknowns(1, [], Ground.under(lines))
     here = replace(Estimate.at(court, [one], unknowns), uneven_m=EVEN_M)
@@ -88,7 +90,9 @@ def test_however_well_a_focal_length_was_measured_heat_may_have_moved_it(monkeyp
 @pytest.mark.usefixtures("without_heat")
 def test_the_worse_the_focal_length_is_known_the_less_sure_is_where_a_camera_stands_that_sees_little():
     well, badly, hardly = (said_of_a_corner(fx=fx) for fx in (0.1, 30.0, 150.0))
-    assert well < said_of_a_corner() < badly < hardly
+    assert well < badly < hardly
+    # Of a lens that nobody vouches for the lines alone say how long it is.
+    assert said_of_a_corner() > badly
     assert badly > 3 * well
     assert said_of_a_corner(fy=150.0) == hardly
 
@@ -97,3 +101,36 @@ def test_the_worse_the_focal_length_is_known_the_less_sure_is_where_a_camera_sta
 @pytest.mark.parametrize("sigma", [{"aspect": 0.01}, {"cx": 30.0, "cy": 30.0}, {"k1": 0.1}])
 def test_what_else_of_a_lens_is_known_badly_makes_a_camera_less_sure_too(sigma):
     assert said_of_a_corner(fx=0.1, **sigma) > 1.1 * said_of_a_corner(fx=0.1)
+
+
+def test_the_sigma_of_a_lens_that_lines_found_is_not_counted_beside_those_lines():
+    known = {"fx": 10.0, "fy": 10.0, "cx": 3.0, "cy": 3.0, "k1": 0.01, "k2": 0.01}
+    assert said_of_a_corner("lines", **known) > 1.2 * said_of_a_corner(**known)
+    assert said_of_a_corner("lines", **known) == said_of_a_corner("lines", fx=0.1)
+
+
+@pytest.mark.parametrize("too_long", [0.003, 0.01, 0.02])
+@pytest.mark.parametrize("nights", [1, 4])
+def test_a_pose_that_was_found_through_a_lens_is_no_witness_of_that_lens(too_long, nights):
+    """Nothing but the lens is off: the camera stands where it was found, night after night."""
+    pitch = Field(105.0, 68.0, 0.12, template=load("football"))
+    real = camera("left", (0.0, -45.0, 14.0), (0.0, 0.0), focal=1000.0, size=(1280, 720))
+    given = with_focal_length(real, too_long * 1000.0)
+    lines, unknowns = pitch.line_points(), Unknowns(1, [], Ground.under(pitch.line_points()))
+    found = replace(measured(lines, real), misfit_px=0.2)
+    here = replace(Estimate.at(pitch, [given], unknowns), uneven_m=EVEN_M)
+    for _ in range(12):
+        here = gauss_newton_step(here, [given], [found], unknowns, huber_weights).to
+    (there,), memory = here.cameras, None
+    for night in range(nights):
+        (said,) = estimate_uncertainty(here, [there], [memory], [found], [NO_EVIDENCE], unknowns).each
+        job = AcceptedJob(there, found, lines, None, frames=str(night))
+        memory = CameraMemory.from_first_job(there, job) if memory is None else memory.after(job)
+    away_m = np.linalg.norm(there.pose.position - real.pose.position)
+    assert away_m > 0.05
+    assert said.sigma.position_m > away_m / 3
+    # It is no zoom: the lens was as wrong when the pose was stored.
+    assert abs(said.zoom.value) < 3 * said.zoom.sigma
+    assert np.linalg.norm(said.refined.camera.pose.position - real.pose.position) < 0.2 * away_m
+    # Where pixels are on the ground is known far better than where the camera stands.
+    assert said.ground_sigma_m < 0.5 * said.sigma.position_m
