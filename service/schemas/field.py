@@ -307,7 +307,7 @@ class FieldOfPlay(Schema):
 
 
 class LengthRefused(ValueError):  # noqa: N818
-    """A field has no such length: `limits` says why, and the question after it is for people who may mean other units."""
+    """A field has no such length: `limits` says why. The question after it is for people who may mean other units."""
 
     def __init__(self, limits: str, question: str) -> None:
         super().__init__(limits + question)
