@@ -14,7 +14,7 @@ import typer
 
 from service.cli.arguments import Data, Yes, load_settings, require_yes
 from service.cli.printing import FAILED, USAGE, fail, print_note, print_rows
-from service.cli.serve import report_database_errors
+from service.cli.serve import report_database_errors, require_folders
 from service.schemas.names import ID_IN_WORDS, ID_PATTERN, Scope
 
 if TYPE_CHECKING:
@@ -141,6 +141,7 @@ def _keys(data: Path | None) -> Iterator[KeyRepository]:
     from service.store.keys import KeyRepository
 
     settings = load_settings(data=data)
+    require_folders(settings)
     with report_database_errors(settings):
         engine = connect(settings.home_database_url)
         # Keys of another folder open nothing, and nothing else would tell.

@@ -47,8 +47,9 @@ def worker(
 
     try:
         settings = load_settings(data=data, worker_name=name)
-        with report_database_errors(settings, with_worker=True):
+        with report_database_errors(settings):
             _check_database_place(settings)
+            require_folders(settings, with_worker=True)
             supervisor.run(settings)
     except AlreadyRunning as error:
         fail(str(error), USAGE)
@@ -59,8 +60,9 @@ def _serve(settings: Settings, *, with_worker: bool) -> None:
     from service.worker_lock import AlreadyRunning
 
     try:
-        with report_database_errors(settings, with_worker=with_worker):
+        with report_database_errors(settings):
             _check_database_place(settings)
+            require_folders(settings, with_worker=with_worker)
             serving.serve(settings, with_worker=with_worker)
     except (serving.CannotListen, AlreadyRunning) as error:
         fail(str(error), USAGE)
@@ -74,17 +76,15 @@ def _check_database_place(settings: Settings) -> None:
 
 
 @contextmanager
-def report_database_errors(settings: Settings | None = None, *, with_worker: bool = False) -> Iterator[None]:
+def report_database_errors(settings: Settings | None = None) -> Iterator[None]:
     """What is wrong with the database is a line: it is wrong at the start, or not of this program's making.
 
-    `settings`: of the service that is about to be used, whose folders must be writable.
+    `settings`: of the service that is about to be used.
     """
     import sqlalchemy as sa
 
     from service.store.database import UnsupportedDatabase
 
-    if settings is not None:
-        _require_folders(settings, with_worker=with_worker)
     try:
         yield
     except UnsupportedDatabase as error:
@@ -96,7 +96,7 @@ def report_database_errors(settings: Settings | None = None, *, with_worker: boo
         fail(f"The database{which} cannot be used: {error.orig}", FAILED)
 
 
-def _require_folders(settings: Settings, *, with_worker: bool) -> None:
+def require_folders(settings: Settings, *, with_worker: bool = False) -> None:
     """End where a folder that the service writes to cannot be made or written."""
     folders = {}
     if settings.database_url is not None and settings.database_url.startswith("sqlite:///"):

@@ -306,8 +306,16 @@ class FieldOfPlay(Schema):
         return size_of(dict(self))
 
 
+class LengthRefused(ValueError):  # noqa: N818
+    """A field has no such length: `limits` says why. The question after it is for people who may mean other units."""
+
+    def __init__(self, limits: str, question: str) -> None:
+        super().__init__(limits + question)
+        self.limits = limits
+
+
 def _must_lie(given: float, extent: Extent, what: str) -> None:
     if not extent.least <= given <= extent.most:
         units = [unit for unit, metres in OTHER_UNITS.items() if extent.least <= given * metres <= extent.most]
         question = f"; are these {' or '.join(units)}?" if units else ""
-        raise ValueError(f"{what}: {extent.least:g} to {extent.most:g} m, not {given:g}{question}")
+        raise LengthRefused(f"{what}: {extent.least:g} to {extent.most:g} m, not {given:g}", question)

@@ -11,9 +11,10 @@ from dataclasses import dataclass
 
 import sqlalchemy as sa
 from pydantic import ValidationError
+from pydantic_core import ErrorDetails
 
 from service.schemas.actor import Actor
-from service.schemas.field import FieldOfPlay
+from service.schemas.field import FieldOfPlay, LengthRefused
 from service.schemas.names import FieldNumber
 from service.schemas.results import AdoptableNumber, Result
 from service.schemas.venue import Venue
@@ -175,7 +176,13 @@ def _refusal(left: _Left, field: FieldOfPlay, wanted: AdoptableNumber) -> str | 
 
 
 def _in_words(error: ValidationError) -> str:
-    return "; ".join(one["msg"].removeprefix("Value error, ") for one in error.errors())
+    return "; ".join(map(_reason, error.errors()))
+
+
+def _reason(finding: ErrorDetails) -> str:
+    """Return what is wrong with a number of the lines, which is in metres: its unit is not in question."""
+    cause = finding.get("ctx", {}).get("error")
+    return cause.limits if isinstance(cause, LengthRefused) else finding["msg"].removeprefix("Value error, ")
 
 
 def _save(connection: sa.Connection, before: StoredVenue, venue: Venue, job_id: str, by: Actor | None) -> None:

@@ -13,6 +13,7 @@ TELLTALE = (
     b"220 admin console, token=hunter2\r\n\r\n",
     b"HTTP/1.1 500 token=hunter2\r\n\r\n",
     b"HTTP/1.1 200 OK\r\ntoken hunter2\r\n\r\n",
+    b"HTTP/1.1 200 OK\r\nContent-Type: token/hunter2\r\n\r\n",
     b"HTTP/1.1 200 OK\r\nTransfer-Encoding: token=hunter2\r\n\r\n",
     b"HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n\r\nhunter2\r\n",
     b"HTTP/1.1 401 token\r\nWWW-Authenticate: Digest hunter2\r\n\r\n",

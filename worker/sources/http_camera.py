@@ -7,6 +7,8 @@ Nothing of a camera's answer is followed: a redirect is refused with where it le
 from __future__ import annotations
 
 import asyncio
+import http.client
+import mimetypes
 import re
 import zlib
 from collections.abc import AsyncIterator, Sequence
@@ -98,8 +100,8 @@ def _check_status(head: Message) -> None:
     if 300 <= head.status < 400:
         raise CameraError(redirect_in_words(head, f"it answered {head.status} and leads"))
     if head.status != 200:
-        reason = (head.first.split(maxsplit=2) + [""] * 3)[2]
-        raise CameraError(f"it answered {head.status} {reason[:100] if reason.isprintable() else ''}".rstrip())
+        # The words beside the status are the host's, which may be anybody's: those of the standard are told instead.
+        raise CameraError(f"it answered {head.status} {http.client.responses.get(head.status, '')}".rstrip())
 
 
 def _without_picture(head: Message, data: bytes) -> bytes:
@@ -114,7 +116,8 @@ def _without_picture(head: Message, data: bytes) -> bytes:
     if kind.startswith("multipart/"):
         raise CameraError("it is a row of pictures (multipart) that ended before the first was whole")
     if kind and not kind.startswith(OF_PICTURES):
-        raise CameraError(f"it answered with {kind}, not with a picture")
+        known = kind if mimetypes.guess_extension(kind) else "something else"
+        raise CameraError(f"it answered with {known}, not with a picture")
     if "chunked" not in "".join(head.all("Transfer-Encoding")).lower() and len(data) < (head.length or 0):
         raise CameraError(f"it ended after {len(data)} of the {head.length} bytes that it announced")
     return data

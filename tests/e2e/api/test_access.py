@@ -21,7 +21,9 @@ SCOPES = ("read", "calibrate", "admin")
 OPEN = {
     "/livez",
     "/readyz",
+    "/problems",
     "/problems/{kind}",
+    "/refusals",
     "/refusals/{reason}",
     "/docs",
     "/docs/rapidoc-min.js",

@@ -82,6 +82,7 @@ def test_a_number_that_the_sport_does_not_allow_is_refused_with_its_limits(servi
     refused = adopt(service, name, job["id"], "length_m")
     assert kind_of(refused) == (422, "/problems/field-number-refused")
     assert "60 to 130 m, not 131.5" in refused.json()["detail"]
+    assert "are these" not in refused.json()["detail"], "what the lines say is in metres"
     assert len(service.http.get(f"/venues/{name}/history").json()["revisions"]) == 2
 
 

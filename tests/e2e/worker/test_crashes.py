@@ -229,11 +229,14 @@ def test_a_silent_bucket_refuses_uploads_and_ends_no_job(service, home, name):
 def test_a_disk_without_a_byte_left_stops_nobody_for_longer_than_that(small_disk):
     service = Service(small_disk / "esc", ESC_MIN_FREE_MB="0").ready()
     worker = service.worker()
-    service.venue("v", "accept 1")
+    service.venue("v")
     service.venue("w")
+    hold = service.data / "hold"
+    hold.touch()
     job = service.submitted("v")
     service.running(job)
     with filled(small_disk):
+        hold.unlink()
         # No room for a sign of life either.
         wait_for(lambda: service.http.get("/readyz").json()["parts"]["worker"] != "ok")
         answer = service.submit("w")

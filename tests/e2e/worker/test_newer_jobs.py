@@ -105,13 +105,21 @@ def test_a_job_that_a_worker_broke_off_before_it_began_is_put_back(start, begin)
 def test_one_job_whose_rows_are_broken_does_not_keep_another_from_its_end(start, begin, given_up):
     service = start("serve")
     first, second = (service.submitted(service.venue(name)) for name in ("first", "second"))
+    changed(service, first, options={})
     with service.database() as connection:
-        connection.execute(
-            sa.update(tables.venues).where(tables.venues.c.id == "first").values(document={"no": "venue"})
-        )
         connection.exec_driver_sql(f"UPDATE workflow_status SET status = '{given_up}'")
     begin(service, "worker")
     assert service.end(second)["error"]["type"] == "/problems/job-abandoned"
     assert service.job(first)["status"] == "queued"
     time.sleep(2 * TAKEOVER_S)
     assert log_of(service).count("cannot end or begin a job that the queue has given up") == 1
+
+
+def test_a_job_of_a_venue_whose_document_is_broken_comes_to_its_end(start, begin):
+    service = start("serve")
+    job = service.submitted(service.venue("broken"))
+    with service.database() as connection:
+        connection.execute(sa.update(tables.venues).values(document={"no": "venue"}))
+        connection.exec_driver_sql("UPDATE workflow_status SET status = 'CANCELLED'")
+    begin(service, "worker")
+    assert service.end(job)["error"]["type"] == "/problems/job-abandoned"
