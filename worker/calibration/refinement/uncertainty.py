@@ -352,22 +352,25 @@ class _Judgement:
         return replace(off, value=longer_px, sigma=float(np.sqrt(varies @ self.covariance @ varies))), since
 
     def _ground_sigma_m(self, camera: Camera, both: Array) -> float | None:
-        """How far off on the ground the worst marking in view may be put, by `both` (12, A), pose and lens together.
+        """How far off on the ground the worst marking in view may be put by pose and lens, `both` (12, A), and field.
 
-        They may each be off by far more, and make up for each other. None where no marking is in view.
+        They may each be off by far more, and make up for each other. What the lines surely contradict is a misfit, which
+        residual and diagnosis tell, and no uncertainty. None where no marking is in view.
         """
-        points = VisibleLines.from_camera(self.here.lines, camera).points.position
-        if len(points) == 0:
+        index = VisibleLines.from_camera(self.here.lines, camera).index
+        if len(index) == 0:
             return None
-        points = points[:: max(len(points) // ASKED_MARKINGS, 1)]
-        slopes = pixel_slopes_of_all(camera, points)
-        by_ground = -slopes[..., 3:5]
-        away = both @ self.value
+        index = index[:: max(len(index) // ASKED_MARKINGS, 1)]
+        slopes = pixel_slopes_of_all(camera, self.here.lines.position[index])
+        by_ground, all_of_it = -slopes[..., 3:6], both
+        for at, parameter in enumerate(self.believed.unknowns.parameters, POSE_NUMBERS * self.believed.unknowns.views):
+            if not isinstance(parameter, LensParameter):
+                slopes = np.concatenate([slopes, by_ground @ parameter.shift[index][..., None]], axis=-1)
+                all_of_it = np.concatenate([all_of_it, self.believed.mixing[at : at + 1]])
         worst = 0.0
         for covariance in (self.by_lines, self.covariance):
-            off = both @ covariance @ both.T + np.outer(away, away)
-            pixels = slopes @ off @ slopes.transpose(0, 2, 1)
-            inverse = np.linalg.pinv(by_ground)
+            pixels = slopes @ (all_of_it @ covariance @ all_of_it.T) @ slopes.transpose(0, 2, 1)
+            inverse = np.linalg.pinv(by_ground[..., :2])
             ground = np.trace(inverse @ pixels @ inverse.transpose(0, 2, 1), axis1=1, axis2=2)
             worst = max(worst, float(np.sqrt(np.quantile(ground, WORST_MARKINGS))))
         return worst
