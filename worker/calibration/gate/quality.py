@@ -40,7 +40,7 @@ class Gate:
     agreement_loss: float = 0.1
     largest_residual_px: float = 2.4
     residual_floor_px: float = 1.2
-    largest_ground_sigma_m: float = 0.6
+    largest_ground_sigma_m: float = 0.25
     largest_found_sigma_m: float = 0.3
     largest_zoomed_m: float = 0.2
     largest_rotation_deg: float = 8.0

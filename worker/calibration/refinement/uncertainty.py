@@ -354,8 +354,8 @@ class _Judgement:
     def _ground_sigma_m(self, camera: Camera, both: Array) -> float | None:
         """How far off on the ground the worst marking in view may be put by pose and lens, `both` (12, A), and field.
 
-        They may each be off by far more, and make up for each other. What the lines surely contradict is a misfit, which
-        residual and diagnosis tell, and no uncertainty. None where no marking is in view.
+        They may each be off by far more, and make up for each other. What the lines surely contradict is a misfit,
+        which residual and diagnosis tell, and no uncertainty. None where no marking is in view.
         """
         index = VisibleLines.from_camera(self.here.lines, camera).index
         if len(index) == 0:
