@@ -29,8 +29,8 @@ RENAMED = {"service": PACKAGE, "fields": f"{PACKAGE}.fields"}
 # Read by the modules of a package.
 DATA = {"fields": "*.toml"}
 DEPENDENCIES = ("httpx", "pydantic")
-# `Schedule` leaves it to the service to judge a schedule where croniter is missing.
-DISPENSABLE = {"croniter"}
+# The schemas leave it to the service to judge a schedule or a lens where these are missing.
+DISPENSABLE = {"croniter", "numpy"}
 
 
 class Unfit(Exception):  # noqa: N818

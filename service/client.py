@@ -373,11 +373,12 @@ class AsyncClient:
         """A picture by the name of its link; None where the job made no such one."""
         return await self._ask("GET", of.links[name]) if name in of.links else None
 
-    async def follow(self, followed: Job, show: Callable[[Job], None], every_s: float = 0.5) -> Job:
-        """Wait for the end of a job, showing what it does meanwhile. The service may be away for a minute."""
+    async def follow(self, followed: Job, show: Callable[[Job], None] | None = None, every_s: float = 0.5) -> Job:
+        """Wait for the end of a job, showing what it does meanwhile if `show` is given. The service may be away for a minute."""
         heard = time.monotonic()
         while followed.open:
-            show(followed)
+            if show is not None:
+                show(followed)
             try:
                 followed = await self.job(followed.id, wait_s=every_s)
                 heard = time.monotonic()

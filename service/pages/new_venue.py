@@ -54,7 +54,8 @@ def _free_id(context: Context) -> str:
 
 
 def _has_jobs(context: Context, venue_id: str) -> bool:
-    return bool(context.jobs.summaries(JobPage(1, venue=venue_id)))
+    found = context.jobs.summaries(JobPage(1, venue=venue_id))
+    return bool(found.summaries or found.unreadable)
 
 
 @data.get("/free", openapi_extra=needs_scope("read"))

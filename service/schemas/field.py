@@ -317,5 +317,5 @@ class LengthRefused(ValueError):  # noqa: N818
 def _must_lie(given: float, extent: Extent, what: str) -> None:
     if not extent.least <= given <= extent.most:
         units = [unit for unit, metres in OTHER_UNITS.items() if extent.least <= given * metres <= extent.most]
-        question = f"; are these {' or '.join(units)}?" if units else ""
+        question = f" (are these {' or '.join(units)}?)" if units else ""
         raise LengthRefused(f"{what}: {extent.least:g} to {extent.most:g} m, not {given:g}", question)

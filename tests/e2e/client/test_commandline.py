@@ -335,7 +335,7 @@ def test_a_venue_is_followed_line_by_line_until_it_is_deleted(service, name):
 
 
 @pytest.mark.parametrize(
-    ("command", "says"), [(("job", "get", "01ABC"), "26 capital"), (("venue", "get", "A B"), "64 of a-z")]
+    ("command", "says"), [(("job", "get", "01ABC"), "26 capital"), (("venue", "get", "A B"), "64 small letters")]
 )
 def test_an_id_that_is_none_is_told_in_words(esc, command, says):
     answer = esc(*command)

@@ -189,7 +189,7 @@ def test_the_wheel_has_the_client_and_nothing_that_it_does_not_reach(wheel):
         "esc_client/fields/football.toml",
     } <= shipped
     assert not {name for name in shipped if re.search("programs|callback_urls|hosts|findings|landmarks", name)}
-    assert not re.search(r"^\s*(from|import) (service|fields|fastapi|numpy|sqlalchemy)\b", text, re.MULTILINE)
+    assert not re.search(r"^\s*(from|import) (service|fields|fastapi|sqlalchemy)\b", text, re.MULTILINE)
 
 
 def test_its_version_is_that_of_the_service(wheel, program):

@@ -72,7 +72,7 @@ LEFT = ("cameras", 0)
             10500,
             "field.length_m: expected 400 m or less, came 10500; it is in metres: are these centimetres",
         ),
-        (("field", "length_m"), 344, "field.length_m: football: 60 to 130 m, not 344; are these feet?"),
+        (("field", "length_m"), 344, "field.length_m: football: 60 to 130 m, not 344 (are these feet?)"),
     ],
 )
 def test_each_mistake_is_told_in_words_of_the_document(path, value, words):

@@ -100,7 +100,9 @@ def test_a_lens_without_rays_for_its_picture_is_refused(distortion):
 @pytest.mark.parametrize("focal", [800, 1500, 60000])
 def test_the_part_without_rays_is_the_part_where_the_engine_has_none(model, distortion, focal):
     size = (1920, 1080)
-    lens = SimpleNamespace(model=model, matrix=matrix(focal, 940, 560), distortion=distortion, sigma=None)
+    lens = SimpleNamespace(
+        model=model, matrix=matrix(focal, 940, 560), distortion=distortion, sigma=None, sigma_from=None
+    )
     columns, rows = ((np.arange(64) + 0.5) / 64 * side - 0.5 for side in size)
     rays = lens_of(lens, list(size)).undistort(np.stack(np.meshgrid(columns, rows), axis=-1))
     seen = map_of(model, lens.matrix, distortion, size)
