@@ -6,12 +6,12 @@ calibration was accepted, the newer job says what its lines say.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import sqlalchemy as sa
 from pydantic import ValidationError
-from pydantic_core import ErrorDetails
 
 from service.schemas.actor import Actor
 from service.schemas.field import FieldOfPlay, LengthRefused
@@ -179,7 +179,7 @@ def _in_words(error: ValidationError) -> str:
     return "; ".join(map(_reason, error.errors()))
 
 
-def _reason(finding: ErrorDetails) -> str:
+def _reason(finding: Mapping[str, Any]) -> str:
     """Return what is wrong with a number of the lines, which is in metres: its unit is not in question."""
     cause = finding.get("ctx", {}).get("error")
     return cause.limits if isinstance(cause, LengthRefused) else finding["msg"].removeprefix("Value error, ")
