@@ -374,7 +374,7 @@ class AsyncClient:
         return await self._ask("GET", of.links[name]) if name in of.links else None
 
     async def follow(self, followed: Job, show: Callable[[Job], None] | None = None, every_s: float = 0.5) -> Job:
-        """Wait for the end of a job, showing what it does meanwhile if `show` is given. The service may be away for a minute."""
+        """Wait for the end of a job, showing what it does meanwhile if asked. The service may be away for a minute."""
         heard = time.monotonic()
         while followed.open:
             if show is not None:
