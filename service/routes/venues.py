@@ -122,12 +122,13 @@ def revision_unfit(unfit: RevisionUnfit) -> Problem:
 
 
 def venue_moved_on(venue_id: str | None, job_id: str, moved: VenueHasChanged) -> Problem:
-    """Answer who wants something of a job to hold after the venue has changed."""
+    """Return the problem of a decision about a job whose venue has changed since."""
     newest = moved.newest
-    is_now = f"at revision {newest.revision} ({newest.cause})" if newest else "deleted"
+    is_now = f"is at revision {newest.revision} ({newest.cause})" if newest else "is deleted"
     return Problem(
         "venue-moved-on",
-        f"Venue {venue_id} is {is_now}, or has another pitch; see GET /venues/{venue_id}/history and decide.",
+        f"Venue {venue_id} {is_now} or has another field by now. To go back to earlier poses restore their revision: "
+        f"GET /venues/{venue_id}/history lists them (esc venue history {venue_id}; esc venue restore {venue_id} N).",
         job=job_id,
         got=newest and newest.revision,
     )
