@@ -48,7 +48,6 @@ def worker(
     try:
         settings = load_settings(data=data, worker_name=name)
         with report_database_errors(settings, with_worker=True):
-            _check_database_place(settings)
             supervisor.run(settings)
     except AlreadyRunning as error:
         fail(str(error), USAGE)
@@ -60,7 +59,6 @@ def _serve(settings: Settings, *, with_worker: bool) -> None:
 
     try:
         with report_database_errors(settings, with_worker=with_worker):
-            _check_database_place(settings)
             serving.serve(settings, with_worker=with_worker)
     except (serving.CannotListen, AlreadyRunning) as error:
         fail(str(error), USAGE)
@@ -77,15 +75,18 @@ def _check_database_place(settings: Settings) -> None:
 def report_database_errors(settings: Settings | None = None, *, with_worker: bool = False) -> Iterator[None]:
     """What is wrong with the database is a line: it is wrong at the start, or not of this program's making.
 
-    `settings`: of the service that is about to be used, whose folders must be writable.
+    `settings`: of the service that is about to be used, whose database must be local and whose folders must be
+    writable.
     """
     import sqlalchemy as sa
 
     from service.store.database import UnsupportedDatabase
 
-    if settings is not None:
-        _require_folders(settings, with_worker=with_worker)
     try:
+        if settings is not None:
+            # First: on a network, not even a folder is made.
+            _check_database_place(settings)
+            _require_folders(settings, with_worker=with_worker)
         yield
     except UnsupportedDatabase as error:
         fail(str(error), USAGE)
