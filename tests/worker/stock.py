@@ -12,6 +12,7 @@ from service.schemas.health import AlarmEvent
 from service.schemas.job import JobError
 from service.schemas.options import Options
 from service.schemas.results import CameraResult, Provenance, Result
+from service.schemas.schedule import Schedule
 from service.schemas.venue import Venue, VenueIn
 from service.settings import Settings
 from service.store import tables
@@ -120,6 +121,12 @@ class Stock(Repositories):
             stored = VenueIn.model_validate(venue(venue_id)).to_venue()
             self.venues.put(stored, anyway)
         return stored
+
+    def schedule(self, venue_id: str, schedule: Schedule | None) -> None:
+        """Put a schedule on a venue, and on its cameras the sources that one needs."""
+        stored = self.venue(venue_id)
+        cameras = [one.model_copy(update={"source": f"http://10.0.0.7/{one.id}.jpg"}) for one in stored.cameras]
+        self.venues.put(stored.model_copy(update={"cameras": cameras, "schedule": schedule}), anyway)
 
 
 def anyway(_: object) -> None:

@@ -18,7 +18,7 @@ from service.store.statistics.snapshot import read_statistics
 from service.store.workers import WorkerRepository
 from tests.homes import in_both_homes
 from tests.trending import displacement, night
-from tests.worker.stock import Stock, anyway, result
+from tests.worker.stock import Stock, result
 
 pytestmark = in_both_homes
 SILENCE_S = 10
@@ -164,7 +164,7 @@ def test_each_camera_has_its_trend_from_its_anchor_on(stock):
 def test_how_late_schedules_are_and_how_long_sources_took_is_told(stock):
     schedule = Schedule(cron="0 3 * * *")
     for name in ("answers", "silent", "waits"):
-        stock.venues.put(stock.venue(name).model_copy(update={"schedule": schedule}), anyway)
+        stock.schedule(name, schedule)
     now, s = stock.schedules.now(), tables.schedules.c
     with stock.engine.begin() as connection:
         for name, minutes, failures in (("answers", 2, 0), ("silent", 10, 3)):

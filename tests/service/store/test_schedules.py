@@ -8,7 +8,6 @@ import pytest
 from service.schemas.schedule import InvalidSchedule, Schedule, next_time, phase_of
 from service.store.schedules import ScheduleRepository
 from tests.homes import in_both_homes
-from tests.worker.stock import anyway
 
 NOON = datetime(2026, 11, 21, 12, tzinfo=UTC)
 LEASE = timedelta(minutes=10)
@@ -89,7 +88,7 @@ def schedules(stock):
 
 def put(stock, cron="*/15 * * * *", exact=False):
     schedule = None if cron is None else Schedule(cron=cron, exact=exact)
-    stock.venues.put(stock.venue("v").model_copy(update={"schedule": schedule}), anyway)
+    stock.schedule("v", schedule)
     return stock.venues.health("v").schedule
 
 
