@@ -293,7 +293,7 @@ def why_not_confirmed(result: CameraResult, *, is_lens_found: bool) -> str | Non
 
 
 def why_lens_unfit(result: CameraResult, suspicions: Sequence[Suspicion]) -> str | None:
-    """What speaks against a lens that was given for a camera that was found through it, in words; None if nothing.
+    """Return what speaks against a lens that was given for a camera found through it, in words; None if nothing.
 
     A job has a stored pose beside the lens. A search has nothing but the lines, and what it finds is stored.
     """

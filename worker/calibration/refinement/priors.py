@@ -102,7 +102,7 @@ def build_priors(
     solved: Unknowns,
     information: Array,
 ) -> Priors:
-    """What is believed of the cameras of an estimate, found with `solved` unknown, beside where they were `stored`.
+    """Return the priors of the cameras of an estimate, found with `solved` unknown, beside where they were `stored`.
 
     `unknowns`: those of `unknowns_of`, and `information` (D, D) of the lines on them.
     """
@@ -238,7 +238,7 @@ class _Errors:
         return [self.add_lasting(group) for group in groups]
 
     def add_lasting(self, group: Group) -> Group:
-        """An error of lens or field that has been the same since poses were stored.
+        """Add an error of lens or field that has been the same since poses were stored.
 
         Those were fitted to lines with it. It has moved them by what makes up for it in the picture, and so a camera
         that has not moved stands beside its stored pose by as much.
@@ -253,7 +253,7 @@ class _Errors:
         return group
 
     def _from_stored(self, number: int, stored: Camera) -> Array:
-        """The movement (6,) of a camera to a stored pose that was fitted through its lens on the stored field."""
+        """Return the movement (6,) to a stored pose that was fitted through its lens on the stored field."""
         means = sum(
             (
                 self._columns[column] * mean
@@ -289,12 +289,12 @@ class _Errors:
 
 
 def _owners(memories: Sequence[CameraMemory | None]) -> list[int]:
-    """The number of the camera of each view: of tonight's, and of those that are remembered."""
+    """Return the number of the camera of each view: of tonight's, and of those that are remembered."""
     return [*range(len(memories)), *(n for n, memory in enumerate(memories) if memory for _ in memory.epochs)]
 
 
 def unknowns_of(here: Estimate, memories: Sequence[CameraMemory | None], solved: Unknowns) -> Unknowns:
-    """Everything that may be off, of all views, found with `solved` unknown.
+    """Return everything that may be off, of all views, found with `solved` unknown.
 
     What heat and zoom rings do to a focal length is a number of each view.
     """

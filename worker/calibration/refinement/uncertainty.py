@@ -329,13 +329,13 @@ class _Judgement:
         )
 
     def _since_stored(self) -> Array:
-        """The errors (A,), with those of lens and field as they were expected: what has happened since."""
+        """Return the errors (A,) with those of lens and field as they were expected: what has happened since."""
         since, lasting = self.value.copy(), self.believed.lasting
         since[lasting] = self.found.mean[lasting]
         return since
 
     def _zoom(self, number: int, solved: Unknowns) -> tuple[Deviation | None, Array]:
-        """How much longer the focal length of a camera is since it was stored, and the errors (A,) that go with it.
+        """Return how much longer a focal length is since it was stored, and the errors (A,) that go with it.
 
         A lens that was wrong when the pose was stored is wrong by as much tonight, and is no zoom; nor is one that was
         put right since. So it is what has happened since, or all that it is off, whichever is less. None where the
@@ -352,7 +352,7 @@ class _Judgement:
         return replace(off, value=longer_px, sigma=float(np.sqrt(varies @ self.covariance @ varies))), since
 
     def _ground_sigma_m(self, camera: Camera, both: Array) -> float | None:
-        """How far off on the ground the worst marking in view may be put by pose and lens, `both` (12, A), and field.
+        """Return how far off on the ground pose and lens, `both` (12, A), and field may put the worst marking in view.
 
         They may each be off by far more, and make up for each other. What the lines surely contradict is a misfit,
         which residual and diagnosis tell, and no uncertainty. None where no marking is in view.
