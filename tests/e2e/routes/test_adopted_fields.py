@@ -90,7 +90,7 @@ def test_the_page_offers_what_can_be_stored_and_says_why_the_rest_cannot(service
     for path in (f"/ui/jobs/{job['id']}", f"/ui/venues/{name}"):
         page = service.http.get(path).text
         assert page.count(f'data-call="/venues/{name}/adopt-field"') == 1
-        assert "It cannot be stored: football: 60 to 130 m, not 131.5 (are these yards?)." in page
+        assert "It cannot be stored: football: 60 to 130 m, not 131.5." in page
     adopt(service, name, job["id"])
     assert "adopt-field" not in service.http.get(f"/ui/jobs/{job['id']}").text
     assert "ridge 0.000 → 0.332 m" in service.http.get(f"/ui/venues/{name}").text

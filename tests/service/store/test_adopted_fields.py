@@ -179,7 +179,7 @@ def test_a_number_that_the_sport_does_not_allow_is_refused_with_its_limits(stock
     job = night(stock, ("length_m", 105.0, 131.5), ("ridge_height_m", 0.0, -0.1))
     refused = {name: one.refused_because for name, one in stock.adopted_fields.adoptable(job).items()}
     assert refused == {
-        "length_m": "football: 60 to 130 m, not 131.5 (are these yards?)",
+        "length_m": "football: 60 to 130 m, not 131.5",
         "ridge_height_m": "the ridge must be 0 to 3 m high, not -0.1 m",
     }
     with pytest.raises(NumberRefused, match="60 to 130 m"):
