@@ -22,16 +22,18 @@ def test_a_database_that_is_away_is_a_line_a_minute_for_each_thing_that_fails_an
     service = start("up", ESC_AUTH="off").ready()
     service.venue("v")
     log = service.data / "log"
-    before = log.stat().st_size
+    before, begun = log.stat().st_size, time.monotonic()
     with home.database_away(service.data):
         # What needs the database asks for it every second or so, and callers ask in between.
         for _ in range(30):
             assert service.http.get("/venues/v").status_code == 503
             time.sleep(0.3)
     lines = [json.loads(line) for line in log.read_bytes()[before:].splitlines()]
-    failures = Counter(line["event"] for line in lines if "error" in line)
-    assert failures["storage is away"] == 1
-    assert set(failures.values()) == {1}
+    minutes = 1 + int((time.monotonic() - begun) // 60)
+    # The same thing may fail in two ways: a connection that ends, and one that is refused.
+    failures = Counter((line["event"], line["error"].partition(":")[0]) for line in lines if "error" in line)
+    assert any(event == "storage is away" for event, _ in failures)
+    assert max(failures.values()) <= minutes
     assert not [line for line in lines if "exception" in line]
     assert Counter(line["event"] for line in lines)["request"] >= 30
 
