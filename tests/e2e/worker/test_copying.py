@@ -164,7 +164,7 @@ def test_a_service_on_the_copy_answers_as_the_one_before_and_goes_on(servers, st
     assert both.stop() == 0
 
 
-def home_with_files(folder, count=300):
+def home_with_files(folder, count=1500):
     a_row_in_every_table(Embedded().database_url(folder))
     (folder / "blobs" / "frames").mkdir(parents=True)
     for number in range(count):
