@@ -345,7 +345,7 @@ def judge_each(problem: Problem, refined: RefinedPoses, progress: ProgressReport
                 repeatability=after.repeatability,
                 zoom=after.zoom,
                 with_fitted_zoom=after.with_fitted_zoom,
-                ground_sigma_m=after.ground_sigma_m,
+                ground_sigma=after.ground_sigma,
                 refined=after.refined,
                 lens_change=after.lens_change,
                 cross_checked=after.cross_checked,

@@ -142,5 +142,5 @@ def test_a_lens_that_was_given_and_does_not_fit_is_said_and_nothing_is_found():
 
 
 def test_a_lens_that_may_be_off_by_more_than_a_first_position_says_so():
-    loose = replace(good(), covariance=np.diag([1e-4**2] * 3 + [0.3**2] * 3), ground_sigma_m=0.1)
+    loose = replace(good(), covariance=np.diag([1e-4**2] * 3 + [0.3**2] * 3))
     assert "say how well it is known (sigma)" in why_lens_unfit(loose, [])

@@ -18,7 +18,7 @@ from worker.calibration.geometry.plausible_pose import films_a_field
 from worker.calibration.geometry.rotation import rotation_angles_deg
 from worker.calibration.refinement.diagnosis import is_sure
 from worker.calibration.refinement.least_squares import FEWEST_MEASUREMENTS
-from worker.calibration.refinement.uncertainty import Deviation, RefinedPose
+from worker.calibration.refinement.uncertainty import Deviation, GroundSigma, RefinedPose
 
 MUCH_UNEXPECTED = 0.4
 """Of the segmentation on the pitch: so much of it beside all lines of the venue are lines of something else."""
@@ -31,7 +31,8 @@ class Gate:
     `least_agreement`: right poses find 0.8 and more of the lines beyond chance on fields of every kind, poses that have
     settled on other lines up to 0.5. `residual_floor_px`: of the frame itself; lines of a small frame are no sharper.
     `largest_ground_sigma_m`: of where markings are put on the ground, which is what poses are used for; pose and lens
-    of a long view may be off by metres along it, and make up for each other. `largest_found_sigma_m`: of a first
+    of a long view may be off by metres along it, and make up for each other. Where grass is so far that it moves by
+    less than `largest_ground_sigma_px` of the frame itself, the frame cannot tell its place any better. `largest_found_sigma_m`: of a first
     position through a lens that was given. `largest_zoomed_m`: how far from here a camera may be whose focal length the
     lines contradict.
     """
@@ -41,6 +42,7 @@ class Gate:
     largest_residual_px: float = 2.4
     residual_floor_px: float = 1.2
     largest_ground_sigma_m: float = 0.25
+    largest_ground_sigma_px: float = 1.0
     largest_found_sigma_m: float = 0.3
     largest_zoomed_m: float = 0.2
     largest_rotation_deg: float = 8.0
@@ -220,14 +222,8 @@ def alone_rejection(result: CameraResult, gate: Gate) -> Refusal | None:
             f"{zoom_in_words(result.camera, result.zoom)}, which puts the camera {result.zoom_shift_m:.2f} m from "
             "where it seems to be: zoom or focus have moved, or the lens is not this one; calibrate the lens again",
         )
-    ground_m = result.sigma.position_m if result.ground_sigma_m is None else result.ground_sigma_m
-    if ground_m > gate.largest_ground_sigma_m:
-        return Refusal(
-            "undetermined",
-            f"the visible lines do not determine the pose: what is in view may lie {ground_m:.2f} m from where it is "
-            f"put on the ground (sigma, at most {gate.largest_ground_sigma_m} m allowed); let the camera see lines in "
-            "more than one direction, or calibrate its lens again",
-        )
+    if undetermined := _why_undetermined(result.ground_sigma, gate):
+        return Refusal("undetermined", undetermined)
     beaten_by_any = seen.agreement < 1 - gate.agreement_loss
     if beaten_by_any and seen.agreement < (before := result.evidence_before()).agreement - gate.agreement_loss:
         return Refusal(
@@ -247,6 +243,20 @@ def alone_rejection(result: CameraResult, gate: Gate) -> Refusal | None:
             "be giving way; look at it, then store this pose, or accept the job by hand",
         )
     return None
+
+
+def _why_undetermined(ground: GroundSigma | None, gate: Gate) -> str | None:
+    advice = "let the camera see lines in more than one direction, or calibrate its lens again"
+    if ground is None:
+        return f"no marking is in view where the pose puts the camera; {advice}"
+    metres, pixels, beyond = ground.worst(gate.largest_ground_sigma_m, gate.largest_ground_sigma_px)
+    if not beyond:
+        return None
+    return (
+        f"the visible lines do not determine the pose: what is in view may lie {metres:.2f} m ({pixels:.1f} px) from "
+        f"where it is put on the ground (sigma, at most {gate.largest_ground_sigma_m} m or "
+        f"{gate.largest_ground_sigma_px} px allowed); {advice}"
+    )
 
 
 def _reason_of(view: ViewCondition) -> Reason:

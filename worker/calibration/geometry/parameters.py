@@ -24,6 +24,8 @@ FREE_FOCAL_LENGTH, FREE_RIDGE_M = 0.005, 0.3
 FREE_FOCAL, FREE_CENTRE, FREE_BEND = 0.1, 20 / 3840, 0.05
 """How far off the numbers of a lens may be that is found with a pose: part of the focal length, part of the frame's
 width, and k1 and k2 at half the width of the frame."""
+TAPE = 3e-4
+"""What a tape that is pulled with care is off by, part of what it measures: 3 cm on a football pitch."""
 FREE_LENGTH_M, FREE_WIDTH_M = 5.0, 5.0
 """Pitches for matches are 90 to 120 m long and 45 to 90 m wide, and mostly near 105 m and 68 m."""
 
@@ -169,8 +171,8 @@ def field_parameters(pitch: Field) -> list[FieldParameter]:
     """What is measured once when a venue is set up."""
     return [
         _ridge_height(pitch, 0.02),
-        _length(pitch, 0.03),
-        _width(pitch, 0.03),
+        _length(pitch, TAPE * pitch.length),
+        _width(pitch, TAPE * pitch.width),
     ]
 
 

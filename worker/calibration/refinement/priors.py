@@ -46,7 +46,9 @@ another; a sigma that was said is wrong twofold one time in nine."""
 LENS_SCALES: Array = 2.0 ** np.arange(6.0)
 """... and nothing moves the rest of a lens so far."""
 FIELD_SCALES: Array = 2.0 ** np.arange(-3.0, 5.0)
-"""A measure of the field may have been taken better than expected, or worse."""
+"""A measure of the field may have been taken better than expected, or worse, ..."""
+FIELD_ODDS = np.minimum(FIELD_SCALES, 1 / FIELD_SCALES) ** 3.0
+"""...but lines that hardly show it are no reason to think so."""
 LEAST_WIND = 1 / 3
 """Of that is left in the mean of many nights: some of it is the season and not the wind."""
 TOUCHED_SCALES: Array = np.array([[s] * 6 for s in (0.01, 1.0, 4.0, 16.0)] + [[s] * 3 + [0.1] * 3 for s in (4.0, 16.0)])
@@ -166,7 +168,8 @@ class _Errors:
         found = {parameter.name for parameter in self._solved.parameters}
         for at, parameter in enumerate(self._unknowns.parameters, POSE_NUMBERS * self._unknowns.views):
             if isinstance(parameter, FieldParameter) and parameter.name not in found:
-                self._blocks.append([self.add_lasting(self._number([at], parameter.expected, FIELD_SCALES))])
+                measure = replace(self._number([at], parameter.expected, FIELD_SCALES), odds=FIELD_ODDS)
+                self._blocks.append([self.add_lasting(measure)])
 
     def add_camera(self, number: int, before: Camera) -> None:
         """A camera without a memory: moved or zoomed since it was where it was stored `before`, through its lens."""

@@ -96,6 +96,26 @@ class Sigma:
 
 
 @dataclass(frozen=True)
+class GroundSigma:
+    """How far from their places the markings in view may be put: one standard deviation, by marking.
+
+    `metres` (N,) on the ground, `pixels` (N,) in the picture.
+    """
+
+    metres: Array
+    pixels: Array
+
+    def worst(self, metres: float, pixels: float) -> tuple[float, float, bool]:
+        """Return metres and pixels of the worst marking, and whether they are beyond both of these limits.
+
+        Where a pixel covers metres of far grass, no frame tells the place of a marking any better than the pixel.
+        """
+        beyond = np.minimum(self.metres / metres, self.pixels / pixels)
+        at = int(np.argsort(beyond)[int(WORST_MARKINGS * (len(beyond) - 1))])
+        return float(self.metres[at]), float(self.pixels[at]), bool(beyond[at] > 1)
+
+
+@dataclass(frozen=True)
 class PoseAndLens:
     """Pose and lens of a camera as the lines have both: for whoever measures in the world.
 
@@ -140,8 +160,8 @@ class RefinedPose:
     `evidence`: how much of the expected lines is seen. None where fewer than `FEWEST_MEASUREMENTS` points were
     measured: `residual_px`, the rms offset of its lines in px of its own frame; `covariance` (6, 6) of (rotation in the
     camera's frame rad, position in the world m), with what lens, field and ground may be off; and `repeatability`, the
-    part of sigma that another night's frames would draw anew. `ground_sigma_m`: how far from their places on the ground
-    the markings in view may be put by pose and lens, the worst of them, one standard deviation, m. `zoom`: how much
+    part of sigma that another night's frames would draw anew. `ground_sigma`: how well pose, lens and field together
+    know where markings are, None where none is in view. `zoom`: how much
     longer than the stored one the focal length is since that pose was stored, None where it was solved for;
     `with_fitted_zoom`: the camera with that focal length, and the pose that goes with it. `refined`: pose and all of
     the lens as the lines have them. `lens_change`: of the focal length since the camera's memory began, None without a
@@ -157,7 +177,7 @@ class RefinedPose:
     repeatability: Sigma | None
     zoom: Deviation | None
     with_fitted_zoom: Camera | None
-    ground_sigma_m: float | None = field(default=None, kw_only=True)
+    ground_sigma: GroundSigma | None = field(default=None, kw_only=True)
     refined: PoseAndLens | None = field(default=None, kw_only=True)
     lens_change: LensChange | None = field(default=None, kw_only=True)
     cross_checked: Callable[[], CrossCheck | None] = field(default=_not_cross_checked, kw_only=True)
@@ -321,7 +341,7 @@ class _Judgement:
             Sigma.from_covariance(self.repeated[own, own]),
             zoom,
             None if zoom is None else moved(with_focal_length(camera, zoom.value), pose @ errors),
-            ground_sigma_m=self._ground_sigma_m(camera, np.concatenate([pose, lens])),
+            ground_sigma=self._ground_sigma(camera, np.concatenate([pose, lens])),
             refined=self._refined(camera, pose, lens),
             lens_change=None if memory is None else self._lens_change(camera, memory),
             cross_checked=partial(checks.of, number),
@@ -351,8 +371,8 @@ class _Judgement:
         varies[self.believed.lasting] = 0.0
         return replace(off, value=longer_px, sigma=float(np.sqrt(varies @ self.covariance @ varies))), since
 
-    def _ground_sigma_m(self, camera: Camera, both: Array) -> float | None:
-        """Return how far off on the ground pose and lens, `both` (12, A), and field may put the worst marking in view.
+    def _ground_sigma(self, camera: Camera, both: Array) -> GroundSigma | None:
+        """Return how far off pose and lens, `both` (12, A), and field may put the markings in view.
 
         They may each be off by far more, and make up for each other. What the lines surely contradict is a misfit,
         which residual and diagnosis tell, and no uncertainty. None where no marking is in view.
@@ -367,13 +387,13 @@ class _Judgement:
             if not isinstance(parameter, LensParameter):
                 slopes = np.concatenate([slopes, by_ground @ parameter.shift[index][..., None]], axis=-1)
                 all_of_it = np.concatenate([all_of_it, self.believed.mixing[at : at + 1]])
-        worst = 0.0
+        inverse = np.linalg.pinv(by_ground[..., :2])
+        metres = pixels = np.zeros(len(index))
         for covariance in (self.by_lines, self.covariance):
-            pixels = slopes @ (all_of_it @ covariance @ all_of_it.T) @ slopes.transpose(0, 2, 1)
-            inverse = np.linalg.pinv(by_ground[..., :2])
-            ground = np.trace(inverse @ pixels @ inverse.transpose(0, 2, 1), axis1=1, axis2=2)
-            worst = max(worst, float(np.sqrt(np.quantile(ground, WORST_MARKINGS))))
-        return worst
+            in_picture = slopes @ (all_of_it @ covariance @ all_of_it.T) @ slopes.transpose(0, 2, 1)
+            on_ground = inverse @ in_picture @ inverse.transpose(0, 2, 1)
+            metres, pixels = np.maximum(metres, _sigmas(on_ground)), np.maximum(pixels, _sigmas(in_picture))
+        return GroundSigma(metres, pixels)
 
     def _refined(self, camera: Camera, pose: Array, lens: Array) -> PoseAndLens:
         both = np.concatenate([pose, lens])
@@ -434,3 +454,8 @@ class _Judgement:
             float(np.hypot(np.sqrt(variance[at]), rows[at] @ self.value)),
             None if most == at else (unknowns.parameters[most], float(correlation[most])),
         )
+
+
+def _sigmas(covariance: Array) -> Array:
+    """Return sigma (N,) from covariances (N, 2, 2)."""
+    return np.asarray(np.sqrt(np.trace(covariance, axis1=1, axis2=2)), dtype=float)

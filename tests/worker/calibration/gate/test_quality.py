@@ -11,7 +11,7 @@ from worker.calibration.detection.view_condition import ViewCondition, ViewFigur
 from worker.calibration.diagnostics.overlap import Overlap
 from worker.calibration.gate.quality import CameraResult, Gate, Moved, alone_rejection, in_one_sentence
 from worker.calibration.geometry.camera import Pose
-from worker.calibration.refinement.uncertainty import Deviation, Sigma
+from worker.calibration.refinement.uncertainty import Deviation, GroundSigma, Sigma
 
 LEFT = pair(())[0]
 
@@ -29,6 +29,11 @@ ZOOMED = Deviation("left", "focal_length_px", 0.02 * LEFT.intrinsics.matrix[0, 0
 FOGGED = ViewCondition(False, "fogged", "far half", "Fogged (far half): most likely fog.", FIGURES)
 
 
+def on_ground(metres, pixels):
+    """Markings that are all as well known."""
+    return GroundSigma(np.full(20, metres), np.full(20, pixels))
+
+
 def good():
     return CameraResult(
         camera=LEFT,
@@ -42,6 +47,7 @@ def good():
         overlap=Overlap(0.9, 0.95, 0.05),
         evidence_before=lambda: seen(0.3),
         moved=Moved(0.5, 0.1, 12.0),
+        ground_sigma=on_ground(0.05, 0.3),
     )
 
 
@@ -60,7 +66,7 @@ def test_a_good_result_passes_the_gate():
         ({"residual_px": None}, "fewer than 30 points"),
         ({"covariance": None}, "fewer than 30 points"),
         ({"residual_px": 9.0}, "px from where the pose puts them"),
-        ({"covariance": np.diag([1e-4**2] * 3 + [1.0**2] * 3)}, "may lie 1.73 m from where it is put on the ground"),
+        ({"ground_sigma": None}, "no marking is in view"),
         (
             {"zoom": ZOOMED, "with_fitted_zoom": moved(LEFT, by=(0.5, 0.0, 0.0))},
             "a focal length 2.00% ± 0.20% longer than the venue says",
@@ -118,6 +124,19 @@ def test_reasons_are_joined_with_one_sign_after_each(reasons, said):
 
 
 def test_a_place_that_is_loose_is_accepted_where_the_markings_are_not():
-    loose = replace(good(), covariance=np.diag([1e-4**2] * 3 + [1.0**2] * 3), ground_sigma_m=0.1)
+    loose = replace(good(), covariance=np.diag([1e-4**2] * 3 + [1.0**2] * 3), ground_sigma=on_ground(0.1, 2.0))
     assert alone_rejection(loose, Gate()) is None
-    assert alone_rejection(replace(good(), ground_sigma_m=0.7), Gate()).reason == "undetermined"
+    told = alone_rejection(replace(good(), ground_sigma=on_ground(0.7, 2.0)), Gate())
+    assert told.reason == "undetermined"
+    assert "may lie 0.70 m (2.0 px) from where it is put on the ground" in told.words
+
+
+def test_far_grass_is_known_well_enough_where_it_is_known_to_a_pixel():
+    assert alone_rejection(replace(good(), ground_sigma=on_ground(0.7, 0.4)), Gate()) is None
+
+
+def test_markings_that_are_loose_at_the_rim_alone_reject_no_pose():
+    metres = np.where(np.arange(100) < 4, 2.0, 0.05)
+    rim = GroundSigma(metres, np.full(100, 3.0))
+    assert alone_rejection(replace(good(), ground_sigma=rim), Gate()) is None
+    assert rim.worst(0.25, 1.0) == (0.05, 3.0, False)
