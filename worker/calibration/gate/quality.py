@@ -32,9 +32,9 @@ class Gate:
     settled on other lines up to 0.5. `residual_floor_px`: of the frame itself; lines of a small frame are no sharper.
     `largest_ground_sigma_m`: of where markings are put on the ground, which is what poses are used for; pose and lens
     of a long view may be off by metres along it, and make up for each other. Where grass is so far that it moves by
-    less than `largest_ground_sigma_px` of the frame itself, the frame cannot tell its place any better. `largest_found_sigma_m`: of a first
-    position through a lens that was given. `largest_zoomed_m`: how far from here a camera may be whose focal length the
-    lines contradict.
+    less than `largest_ground_sigma_px` of the frame itself, the frame cannot tell its place any better.
+    `largest_found_sigma_m`: of a first position through a lens that was given. `largest_zoomed_m`: how far from here a
+    camera may be whose focal length the lines contradict.
     """
 
     least_agreement: float = 0.6
