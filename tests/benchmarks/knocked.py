@@ -4,14 +4,15 @@
     python -m tests.benchmarks.knocked --only real --turns 8 15 --folder FOLDER
 
 Sections: `rendered` (every template, knocked by 5 to 45 degrees and 0 to 2 m), `real` (frames with known cameras, where
-they are, knocked likewise, and turned by each of `--turns` degrees about any axis), `exchanged` (the frames of 2, 3 and
-4 cameras of a venue, each sent for the next one). The frame is always one that sees enough of the field: a camera that
-is knocked until it sees nothing of it cannot be found. What is knocked is the stored pose, which sees some of the field
-as well. Some pictures are too dark, blurred or faint for any job: beside the share of all draws stands that of those
-whose frame a job accepts which begins with the true pose. Where its lines lead astray, that job ends as far from the
-true pose: how many of the wrong ones stand where it ends is said in brackets. Every run is written to a file and not
-run again, so that long ones can be continued; after a change of the engine or of the renderer the file has to be
-removed.
+they are, knocked likewise, and turned by each of `--turns` degrees about any axis), `called` (a camera of the demo and
+of four rendered venues, turned by 2 to 45 degrees about its view or any axis beside its neighbours: what the answer
+calls it), `exchanged` (the frames of 2, 3 and 4 cameras of a venue, each sent for the next one). The frame is always
+one that sees enough of the field: a camera that is knocked until it sees nothing of it cannot be found. What is knocked
+is the stored pose, which sees some of the field as well. Some pictures are too dark, blurred or faint for any job:
+beside the share of all draws stands that of those whose frame a job accepts which begins with the true pose. Where its
+lines lead astray, that job ends as far from the true pose: how many of the wrong ones stand where it ends is said in
+brackets. Every run is written to a file and not run again, so that long ones can be continued; after a change of the
+engine or of the renderer the file has to be removed.
 """
 
 from __future__ import annotations
@@ -37,6 +38,8 @@ from tests.benchmarks.find import NEAR, UNSEEN_PX, ends_alike, wrong_in_words, w
 from tests.benchmarks.rows import Rows
 from tests.benchmarks.scenes import FOLDER as RUNS
 from tests.benchmarks.scenes import scene
+from tests.benchmarks.truth import apart
+from tests.demo import render as demo
 from worker.calibration.geometry.camera import Camera, Frame, Pose
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.rotation import rotation_matrices, rotation_vectors
@@ -49,13 +52,17 @@ LEAST_DEG, MOST_DEG, MOST_M = 5.0, 45.0, 2.0
 ABOUT = np.array([0.4, 1.0, 0.1])
 """How much of a knock turns a camera up or down, to a side, and about its view: a clamp gives way about its pole."""
 BINS_DEG = ((5.0, 15.0), (15.0, 30.0), (30.0, 45.0))
+DEMO = Path(demo.__file__).parent
 VENUES = ("pair-match-1", "three-match", "four-real")
+TURNED_VENUES = ("demo", "pair-match-1", "low-match", "apart-real", "four-real")
+LEAST_TURN_DEG, SHIFT_M = 2.0, 0.05
+NEAR_M, NEAR_DEG = 0.3, 0.3
 
 
 def main() -> None:
     """Run what is asked for and print it."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    sections = {"rendered": _rendered, "real": _real, "exchanged": _exchanged}
+    sections = {"rendered": _rendered, "real": _real, "called": _called, "exchanged": _exchanged}
     parser.add_argument("--only", nargs="+", choices=sections, default=list(sections), help="sections")
     parser.add_argument("--folder", type=Path, default=real.FOLDER, help="of real frames, with cases.json")
     parser.add_argument("--cases", nargs="+", help="real ones with one of these in their names")
@@ -114,6 +121,29 @@ def _real(options: argparse.Namespace, engine: Engine) -> Iterator[str]:
     yield from _table(table, knocked)
 
 
+def _called(options: argparse.Namespace, engine: Engine) -> Iterator[str]:
+    yield "| venue | about | draws | found | called knocked | accepted | called otherwise | wrong | core-s |"
+    yield "|---" * 9 + "|"
+    for name in TURNED_VENUES:
+        rows = [
+            engine.rows.remembered(
+                {"turned in": name, "n": number, "model": engine.name},
+                lambda name=name, number=number: _called_row(name, number, engine),
+            )
+            for number in range(options.draws)
+        ]
+        for about in ("view", "any axis"):
+            its = [row for row in rows if row["about"] == about]
+            found = [row for row in its if row["near"]]
+            counts = [sum(row["called"] == word for row in found) for word in ("knocked", "accepted")]
+            wrong = sum(row["called"] in ("knocked", "accepted") for row in its if not row["near"])
+            cores = np.median([row["core_seconds"] for row in its])
+            yield (
+                f"| {name} | {about} | {len(its)} | {len(found)} | {counts[0]} | {counts[1]} "
+                f"| {len(found) - sum(counts)} | {wrong} | {cores:.1f} |"
+            )
+
+
 def _exchanged(options: argparse.Namespace, engine: Engine) -> Iterator[str]:
     yield "| cameras exchanged | said so | taken for knocked | accepted | core-s |"
     yield "|---|---|---|---|---|"
@@ -123,6 +153,38 @@ def _exchanged(options: argparse.Namespace, engine: Engine) -> Iterator[str]:
         )
         said, knocked, accepted = (sum(row[key]) for key in ("said", "knocked", "accepted"))
         yield f"| {len(row['said'])} | {said} | {knocked} | {accepted} | {row['core_seconds']:.1f} |"
+
+
+def _called_row(name: str, number: int, engine: Engine) -> dict:
+    pitch, cameras, frames = _demo() if name == "demo" else _of_scene(name)
+    rng = _rng(name, number)
+    is_rolled = number % 2 == 0
+    truth, *others = cameras
+    while True:
+        axis = np.array([0.0, 0.0, rng.choice([-1.0, 1.0])]) if is_rolled else rng.normal(size=3)
+        turn = np.radians(rng.uniform(LEAST_TURN_DEG, MOST_DEG)) * axis / np.linalg.norm(axis)
+        position = truth.pose.position + rng.normal(0, SHIFT_M, 3)
+        before = truth.with_pose(Pose(rotation_vectors(rotation_matrices(turn) @ truth.pose.matrix), position))
+        if _sees_markings(pitch, before):
+            break
+    answer = engine(pitch, [before, *others], frames, number)
+    row = answer.row | {"about": "view" if is_rolled else "any axis", "deg": float(np.degrees(np.linalg.norm(turn)))}
+    if answer.said is None:
+        return row | {"called": "failed", "near": False}
+    result = answer.said.cameras[0]
+    metres, degrees = apart(result.camera, truth)
+    called = "accepted" if result.accepted else "" if result.refusal is None else result.refusal.reason
+    return row | {"called": called, "near": bool(metres < NEAR_M and degrees < NEAR_DEG)}
+
+
+def _demo() -> tuple[Field, list[Camera], dict[str, list[Frame]]]:
+    frames = {one.id: [cv2.imread(str(DEMO / f"{one.id}.jpg"))] for one in demo.cameras()}
+    return demo.FIELD, demo.cameras(), frames
+
+
+def _of_scene(name: str) -> tuple[Field, list[Camera], dict[str, list[Frame]]]:
+    venue = scene(name)
+    return venue.pitch, venue.real, venue.frames
 
 
 def _rendered_row(name: str, number: int, engine: Engine) -> dict:
