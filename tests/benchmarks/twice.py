@@ -1,20 +1,20 @@
-"""`make bench-truth ONLY=twice`: whether an answer vouches for the lens that it was found with.
+"""`make bench-truth ONLY=twice`: whether an answer vouches for the lens and the field that it was found with.
 
     python -m tests.benchmarks.twice --only measured
     python -m tests.benchmarks.twice --only rendered --focals 4000
 
-A venue begins with what a search found through the lens that somebody gave, which may be too long. From there: its
-first jobs, a change of the field that forgets them (`patch`), a restore that drops them (`restore`), and the refined
-pose and lens of its last job stored in place of its own (`adopt`). Wrong is what is found or accepted beyond three of
-its sigmas, or 30 cm. Sections: `measured`, lines without pictures; `rendered`, pictures, the network, and a search for
-the camera.
+A venue begins with what a search found through the lens and on the field that somebody gave, which may be wrong: too
+long, of pixels that are not as high as said, of another size, out of square. From there: its first jobs, a change of
+the field that forgets them (`patch`), a restore that drops them (`restore`), and the refined pose and lens of its last
+job stored in place of its own (`adopt`). Wrong is what is found or accepted beyond three of its sigmas, or 30 cm.
+Sections: `measured`, lines without pictures; `rendered`, pictures, the network, and a search for the camera.
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import cv2
 import numpy as np
@@ -29,15 +29,47 @@ from worker.calibration.calibrate import calibrate
 from worker.calibration.find_cameras import find_cameras, why_lens_unfit
 from worker.calibration.gate.quality import CameraResult
 from worker.calibration.geometry.camera import Camera, Frame
-from worker.calibration.geometry.field import Field
+from worker.calibration.geometry.field import Field, LinePoints
+from worker.calibration.geometry.visibility import VisibleLines
 from worker.calibration.memory.camera_memory import CameraMemory
 from worker.calibration.records import Options
 from worker.calibration.refinement.diagnosis import find_suspicions
 from worker.calibration.refinement.refine import refine
 from worker.calibration.relocalisation.sought import SoughtCamera, SoughtLens
 
-TOO_LONG = (0.0, 0.003, 0.01, 0.02)
-"""By which part the focal length that is given is longer than the real one."""
+
+@dataclass(frozen=True)
+class Mistake:
+    """What is given wrong: numbers of the `lens` as in `lenses.py`, or a field that is really larger by parts of
+    `length` and `width`, or has its touchlines shifted by `skew_m` along themselves."""
+
+    name: str
+    lens: Mapping[str, float] = field(default_factory=dict)
+    length: float = 0.0
+    width: float = 0.0
+    skew_m: float = 0.0
+
+    def given(self, real: Camera) -> Camera:
+        """The camera with the lens that is said."""
+        return real.with_lens(_lens(real.intrinsics, {name: 1 / (1 + by) - 1 for name, by in self.lens.items()}))
+
+    def displaced(self, lines: LinePoints) -> np.ndarray:
+        """Where the line points (N, 3) of `PITCH` really are."""
+        there = PITCH.resized(length=PITCH.length * (1 + self.length), width=PITCH.width * (1 + self.width))
+        x, y, z = there.same_line_points(lines).position.T
+        return np.stack([x + self.skew_m * y / (PITCH.width / 2), y, z], axis=1)
+
+
+MISTAKES = [
+    Mistake("nothing"),
+    *(Mistake(f"focal length {part:.1%}", {"focal": part}) for part in (0.001, 0.003, 0.01, 0.02)),
+    *(Mistake(f"aspect {part:.2%}", {"aspect": part}) for part in (0.003, 0.0074, 0.01)),
+    *(Mistake(f"length and width {part:.1%}", length=part, width=part) for part in (0.005, 0.01)),
+    Mistake("100 x 64 m said to be 105 x 68", length=100 / 105 - 1, width=64 / 68 - 1),
+    *(Mistake(f"skew {skew_m} m", skew_m=skew_m) for skew_m in (0.1, 0.2, 0.3)),
+]
+LENS_MISTAKES = MISTAKES[:5]
+"""Those that a rendered frame has."""
 STEPS = ("find", "job", "job", "job", "patch", "restore", "adopt", "adopt")
 REPAINTED = replace(PITCH, line_width=0.121)
 """A field whose lines are said to be a millimetre wider: what was remembered is of another field."""
@@ -69,21 +101,23 @@ class Answer:
 def main() -> None:
     """Run what is asked for and print it."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    sections = {"measured": _measured, "rendered": _rendered}
+    sections = {"measured": (_measured, MISTAKES), "rendered": (_rendered, LENS_MISTAKES)}
     parser.add_argument("--only", nargs="+", choices=sections, default=list(sections))
     parser.add_argument("--focals", nargs="+", type=float, default=list(FOCAL_LENGTHS))
     options = parser.parse_args()
     for name in options.only:
         print(f"\n## {name}\n", flush=True)
-        for line in _table(options.focals, sections[name]):
+        for line in _table(options.focals, *sections[name]):
             print(line, flush=True)
 
 
-def _table(focals: Sequence[float], life: Callable[[float, str, float], list[Answer]]) -> Iterator[str]:
-    yield "| focal length too long by | step | answers | accepted | wrong | error of accepted, cm, most | over sigma |"
+def _table(
+    focals: Sequence[float], life: Callable[[float, str, Mistake], list[Answer]], mistakes: Sequence[Mistake]
+) -> Iterator[str]:
+    yield "| given wrong | step | answers | accepted | wrong | error of accepted, cm, most | over sigma |"
     yield "|---|---|---|---|---|---|---|"
-    for too_long in TOO_LONG:
-        lives = [life(focal, view, too_long) for focal in focals for view in VIEWS]
+    for mistake in mistakes:
+        lives = [life(focal, view, mistake) for focal in focals for view in VIEWS]
         for step in dict.fromkeys(STEPS):
             answers = [one for life in lives for one, name in zip(life, STEPS, strict=False) if name == step]
             taken = [one for one in answers if one.accepted]
@@ -91,32 +125,32 @@ def _table(focals: Sequence[float], life: Callable[[float, str, float], list[Ans
             ratio = max((one.error_m / one.sigma_m for one in taken), default=0.0)
             wrong = sum(one.wrong for one in answers)
             counts = f"{len(answers)} | {len(taken)} | {wrong}"
-            yield f"| {too_long:.1%} | {step} | {counts} | {100 * most:.1f} | {ratio:.1f} |"
+            yield f"| {mistake.name} | {step} | {counts} | {100 * most:.1f} | {ratio:.1f} |"
 
 
-def _given(real: Camera, too_long: float) -> Camera:
-    return real.with_lens(_lens(real.intrinsics, {"focal": 1 / (1 + too_long) - 1}))
-
-
-def _measured(focal: float, view: str, too_long: float) -> list[Answer]:
+def _measured(focal: float, view: str, mistake: Mistake) -> list[Answer]:
     rng = np.random.default_rng([41, int(focal), list(VIEWS).index(view)])
     real = camera_of_view(focal, view, rng)
     painted = Painted.drawn(PITCH, rng)
+    displacement = mistake.displaced(painted.lines) - painted.lines.position
+    painted = replace(painted, there=painted.there + displacement)
     shared = SHARED_PX * rng.normal(size=(1, len(painted.lines)))
 
     def tonight() -> SimulatedSight:
         swayed = real.with_pose(outdated(real.pose, WIND_M, WIND_DEG, rng))
         return SimulatedSight.of_night(painted, [swayed], shared, rng)
 
-    def night(field: Field, stored: Camera, memory: CameraMemory | None) -> tuple[CameraResult, CameraMemory | None]:
-        venue = Installation(field, [stored], [memory])
+    def night(pitch: Field, stored: Camera, memory: CameraMemory | None) -> tuple[CameraResult, CameraMemory | None]:
+        venue = Installation(pitch, [stored], [memory])
         (result,) = venue.night(tonight())
         return result, venue.memories[0]
 
-    begun = _given(real, too_long)
-    # As a search does it: from near the pose that suits the lens it is given, until nothing moves.
+    begun = mistake.given(real)
+    # As a search does it: from near the pose that suits what it is given, until nothing moves.
     direction = real.pose.position - [*VIEWS[view][0], 0.0]
-    aside = outdated(replace(real.pose, position=real.pose.position + too_long * direction), FOUND_M, FOUND_DEG, rng)
+    in_view = VisibleLines.from_camera(painted.lines, real).index
+    suited = real.pose.position + mistake.lens.get("focal", 0.0) * direction - displacement[in_view].mean(axis=0)
+    aside = outdated(replace(real.pose, position=suited), FOUND_M, FOUND_DEG, rng)
     found, sight = begun.with_pose(aside), tonight()
     for _ in range(3):
         (found,) = refine(PITCH, [found], sight, 0.5, stored=[found]).cameras
@@ -128,19 +162,19 @@ def _measured(focal: float, view: str, too_long: float) -> list[Answer]:
     return [answer, *_later(found, real, night)] if is_found else [answer]
 
 
-def _rendered(focal: float, view: str, too_long: float) -> list[Answer]:
+def _rendered(focal: float, view: str, mistake: Mistake) -> list[Answer]:
     seen: Seen = _seen(focal, view, 0)
     (real,), rng = seen.scene.real, np.random.default_rng([43, int(focal), list(VIEWS).index(view)])
     (frame,) = seen.scene.frames[real.id]
-    given = _given(real, too_long)
+    given = mistake.given(real)
 
     def tonight() -> Frame:
         noisy = frame + np.float32(NOISE) * rng.standard_normal(frame.shape, dtype=np.float32)
         return np.clip(noisy + 0.5, 0, 255).astype(np.uint8)
 
-    def night(field: Field, stored: Camera, memory: CameraMemory | None) -> tuple[CameraResult, CameraMemory | None]:
+    def night(pitch: Field, stored: Camera, memory: CameraMemory | None) -> tuple[CameraResult, CameraMemory | None]:
         memories = {} if memory is None else {real.id: memory}
-        said = calibrate(field, [stored], {real.id: [tonight()]}, seen.segmenter, Options(), memories=memories)
+        said = calibrate(pitch, [stored], {real.id: [tonight()]}, seen.segmenter, Options(), memories=memories)
         return said.cameras[0], said.memories.get(real.id, memory)
 
     sought = SoughtCamera(real.id, [SoughtLens.known(given.intrinsics)])

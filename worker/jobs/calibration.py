@@ -15,7 +15,7 @@ from worker.calibration.calibrate import calibrate
 from worker.calibration.detection.view_condition import UsualView
 from worker.calibration.gate.quality import Gate
 from worker.calibration.geometry.field import Field
-from worker.calibration.geometry.parameters import field_parameters
+from worker.calibration.geometry.parameters import field_measures
 from worker.calibration.memory.camera_memory import CameraMemory, memories_of_field
 from worker.calibration.refinement import diagnosis
 from worker.calibration.stitching.photometry import Light
@@ -200,11 +200,11 @@ def _adoptable(venue: Venue, found: engine.Calibration) -> list[AdoptableNumber]
 
     None where a venue with a ridge was calibrated as if it were flat: they are numbers of another field.
     """
-    of_field = [one for one in found.suspicions if one.camera is None]
+    given = {measure.name: measure.read(found.pitch) for measure in field_measures(found.pitch)}
+    of_field = [one for one in found.suspicions if one.camera is None and one.quantity in given]
     if not of_field or (found.pitch.ridge is None and venue.field.ridge is not None):
         return []
     accepted = {camera.camera.id for camera in found.cameras if camera.accepted}
-    given = {parameter.name: parameter.read(found.pitch) for parameter in field_parameters(found.pitch)}
     return [
         AdoptableNumber(
             name=one.quantity,

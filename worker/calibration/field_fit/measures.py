@@ -16,7 +16,7 @@ from worker.calibration.calibrate import judge_together
 from worker.calibration.field_fit.ridge_length import TriedRidges, try_ridges
 from worker.calibration.geometry.camera import Camera, Frame
 from worker.calibration.geometry.field import Field
-from worker.calibration.geometry.parameters import FieldParameter, LensParameter, Parameter, free_field
+from worker.calibration.geometry.parameters import FieldMeasure, LensParameter, Parameter, free_field
 from worker.calibration.observe import FrameObserver
 from worker.calibration.records import EngineResult, Options, Progress, ProgressReporter, Segment
 from worker.calibration.refinement.refine import SEARCH_PX, Observations, refine
@@ -142,7 +142,7 @@ def leave_measures(pitch: Field) -> list[Measure]:
 def _measure(
     given: Field,
     fitted: Field,
-    parameter: FieldParameter,
+    parameter: FieldMeasure,
     found: ParameterUncertainty,
     tried: TriedRidges,
     cameras: Sequence[Camera],
@@ -178,8 +178,8 @@ def _open_ridge_length(pitch: Field) -> float:
 
 
 def _with_known(
-    given: Field, fitted: Field, free: Sequence[FieldParameter], measures: Sequence[Measure], ridge: Measure
-) -> tuple[Field, list[FieldParameter]]:
+    given: Field, fitted: Field, free: Sequence[FieldMeasure], measures: Sequence[Measure], ridge: Measure
+) -> tuple[Field, list[FieldMeasure]]:
     """The given pitch with the measures that are known, and which of them are found along with poses."""
     pitch, still_free = given, []
     for parameter, measure in zip(free, measures, strict=True):

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import hypot
+from typing import Self
 
 import numpy as np
 
@@ -53,42 +54,56 @@ class LensParameter:
 
 @dataclass(frozen=True)
 class FieldParameter:
-    """A measure of the field, metres. `expected`: how far off one that was taken with care is; `read` and `write`: of a
-    pitch, and one with another; `shift` (N, 3): how a pitch's line points move, metres per metre.
+    """A number of the field, metres. `expected`: how far off one that was measured with care is.
+
+    `shift` (N, 3): how the line points move, metres per metre.
     """
 
     name: str
     expected: float
+    shift: Array = field(default_factory=lambda: np.empty((0, 3)), kw_only=True)
+    lines: LinePoints | None = field(default=None, kw_only=True)
+
+    def around(self, pitch: Field, lines: LinePoints) -> Self:
+        """The same number as it moves `lines` of a pitch that may have been changed since."""
+        return self if lines is self.lines else replace(self, shift=self._shift_of(pitch, lines), lines=lines)
+
+    def applied(self, cameras: Sequence[Camera], pitch: Field, by: float) -> tuple[list[Camera], Field]:
+        """Cameras and pitch with this number changed: only measures can be solved for."""
+        raise NotImplementedError(self.name)
+
+    def _shift_of(self, pitch: Field, lines: LinePoints) -> Array:
+        raise NotImplementedError(self.name)
+
+
+@dataclass(frozen=True)
+class FieldMeasure(FieldParameter):
+    """A measure that a field can have otherwise: `read` and `write` it of a pitch."""
+
     read: Callable[[Field], float]
     write: Callable[[Field, float], Field]
-    shift: Array
-    lines: LinePoints | None = None
-
-    @classmethod
-    def of(
-        cls,
-        pitch: Field,
-        name: str,
-        expected: float,
-        read: Callable[[Field], float],
-        write: Callable[[Field, float], Field],
-    ) -> FieldParameter:
-        """A measure of this pitch."""
-        return cls(name, expected, read, write, np.empty((0, 3))).around(pitch, pitch.line_points())
-
-    def around(self, pitch: Field, lines: LinePoints) -> FieldParameter:
-        """The same measure as it moves `lines` of a pitch that may have been changed since."""
-        if lines is self.lines:
-            return self
-        ahead, behind = (
-            self.write(pitch, self.read(pitch) + step).same_line_points(lines).position
-            for step in (FIELD_STEP_M, -FIELD_STEP_M)
-        )
-        return replace(self, shift=(ahead - behind) / (2 * FIELD_STEP_M), lines=lines)
 
     def applied(self, cameras: Sequence[Camera], pitch: Field, by: float) -> tuple[list[Camera], Field]:
         """Cameras and pitch with this measure changed, as far as it can be."""
         return list(cameras), self.write(pitch, self.read(pitch) + by)
+
+    def _shift_of(self, pitch: Field, lines: LinePoints) -> Array:
+        ahead, behind = (
+            self.write(pitch, self.read(pitch) + step).same_line_points(lines).position
+            for step in (FIELD_STEP_M, -FIELD_STEP_M)
+        )
+        return np.asarray((ahead - behind) / (2 * FIELD_STEP_M), dtype=float)
+
+
+@dataclass(frozen=True)
+class FieldSkew(FieldParameter):
+    """How far each touchline is shifted along itself, the far one to the right: of a field that is out of square.
+
+    No venue can have one: it is named, and explains what else would bend the lenses.
+    """
+
+    def _shift_of(self, pitch: Field, lines: LinePoints) -> Array:
+        return lines.position[:, 1:2] / (pitch.width / 2) * [1.0, 0.0, 0.0]
 
 
 Parameter = LensParameter | FieldParameter
@@ -167,13 +182,19 @@ def free_lens_sigma(lens: Lens) -> dict[str, float]:
     }
 
 
-def field_parameters(pitch: Field) -> list[FieldParameter]:
+def field_measures(pitch: Field) -> list[FieldMeasure]:
     """What is measured once when a venue is set up."""
     return [
         _ridge_height(pitch, 0.02),
         _length(pitch, TAPE * pitch.length),
         _width(pitch, TAPE * pitch.width),
     ]
+
+
+def field_parameters(pitch: Field) -> list[FieldParameter]:
+    """What may be off of a field: its measures, and its right angles, which are laid out by diagonals."""
+    skew = FieldSkew("skew_m", TAPE * hypot(pitch.length, pitch.width))
+    return [*field_measures(pitch), skew.around(pitch, pitch.line_points())]
 
 
 def with_focal_length(camera: Camera, longer_px: float) -> Camera:
@@ -190,32 +211,29 @@ def free_focal_lengths(cameras: Sequence[Camera]) -> list[LensParameter]:
     ]
 
 
-def free_ridge(pitch: Field) -> list[FieldParameter]:
+def free_ridge(pitch: Field) -> list[FieldMeasure]:
     """The height of the ridge, to be found along with the poses."""
     return [_ridge_height(pitch, FREE_RIDGE_M)]
 
 
-def free_field(pitch: Field) -> list[FieldParameter]:
+def free_field(pitch: Field) -> list[FieldMeasure]:
     """Length, width and height of a field of which next to nothing is known."""
     return [_length(pitch, FREE_LENGTH_M), _width(pitch, FREE_WIDTH_M), _ridge_height(pitch, FREE_RIDGE_M)]
 
 
-def _ridge_height(pitch: Field, expected: float) -> FieldParameter:
-    return FieldParameter.of(
-        pitch,
-        "ridge_height_m",
-        expected,
-        lambda one: one.ridge_height,
-        lambda one, now: one.raised(now - one.ridge_height),
+def _ridge_height(pitch: Field, expected: float) -> FieldMeasure:
+    measure = FieldMeasure(
+        "ridge_height_m", expected, lambda one: one.ridge_height, lambda one, now: one.raised(now - one.ridge_height)
     )
+    return measure.around(pitch, pitch.line_points())
 
 
-def _length(pitch: Field, expected: float) -> FieldParameter:
+def _length(pitch: Field, expected: float) -> FieldMeasure:
     """Of the pitch; its ridge keeps its own."""
-    return FieldParameter.of(
-        pitch, "length_m", expected, lambda one: one.length, lambda one, now: one.resized(length=now)
-    )
+    measure = FieldMeasure("length_m", expected, lambda one: one.length, lambda one, now: one.resized(length=now))
+    return measure.around(pitch, pitch.line_points())
 
 
-def _width(pitch: Field, expected: float) -> FieldParameter:
-    return FieldParameter.of(pitch, "width_m", expected, lambda one: one.width, lambda one, now: one.resized(width=now))
+def _width(pitch: Field, expected: float) -> FieldMeasure:
+    measure = FieldMeasure("width_m", expected, lambda one: one.width, lambda one, now: one.resized(width=now))
+    return measure.around(pitch, pitch.line_points())

@@ -21,6 +21,7 @@ MORE_OR_LESS = {
     "ridge_height_m": ("a ridge", "m higher", "m lower"),
     "length_m": ("a pitch", "m longer", "m shorter"),
     "width_m": ("a pitch", "m wider", "m narrower"),
+    "skew_m": ("a pitch out of square, the far touchline", "m farther right", "m farther left"),
 }
 
 

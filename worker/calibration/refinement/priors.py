@@ -44,8 +44,10 @@ UNSTATED_ODDS, STATED_ODDS = FOCAL_SCALES**0.0, FOCAL_SCALES**-3.0
 """Odds of these scales for a lens before any line: where nobody said how far it may be off, none is likelier than
 another; a sigma that was said is wrong twofold one time in nine."""
 LENS_SCALES: Array = 2.0 ** np.arange(6.0)
-"""... and nothing moves the rest of a lens so far."""
-FIELD_SCALES: Array = 2.0 ** np.arange(-3.0, 5.0)
+"""... and nothing moves the rest of a lens so far; but what squeezes pictures moves the aspect by as much."""
+FOCAL, ASPECT, REST = {LENS_NUMBERS[0]}, {LENS_NUMBERS[3]}, set(LENS_NUMBERS) - {LENS_NUMBERS[0], LENS_NUMBERS[3]}
+"""Numbers of a lens that go wrong together."""
+FIELD_SCALES: Array = 2.0 ** np.arange(-3.0, 7.0)
 """A measure of the field may have been taken better than expected, or worse, ..."""
 FIELD_ODDS = np.minimum(FIELD_SCALES, 1 / FIELD_SCALES) ** 3.0
 """...but lines that hardly show it are no reason to think so."""
@@ -222,23 +224,26 @@ class _Errors:
         return self._number(places, HEAT_FOCAL * focal, scales)
 
     def _lens(self, number: int, mean: Array) -> list[Group]:
-        """The focal length of a lens, and the rest of it, of which `mean` (6,) is expected: groups of their own."""
+        """The numbers of a lens, of which `mean` (6,) is expected: focal length, aspect and the rest, each a group."""
         known = [
-            (self._places[number, p.name], p.expected, mean[LENS_NUMBERS.index(p.name)], p.name == "focal_length_px")
+            p
             for p in self._unknowns.parameters
             if isinstance(p, LensParameter) and p.camera == number and not self._is_solved(p)
         ]
         is_stated = any(name in self._cameras[number].intrinsics.sigma for name in ("fx", "fy"))
-        odds = STATED_ODDS if is_stated else UNSTATED_ODDS
         groups = []
-        for of_focal, scales in ((True, FOCAL_SCALES), (False, LENS_SCALES)):
-            its = [(at, expected, value) for at, expected, value, focal in known if focal == of_focal]
+        for names, scales, odds in (
+            (FOCAL, FOCAL_SCALES, STATED_ODDS if is_stated else UNSTATED_ODDS),
+            (ASPECT, FOCAL_SCALES, STATED_ODDS),
+            (REST, LENS_SCALES, None),
+        ):
+            its = [p for p in known if p.name in names]
             if its:
-                places, expected, means = zip(*its, strict=True)
-                columns = np.eye(self._unknowns.dense)[:, list(places)]
-                group = self._group(columns, np.array(expected), np.array(means), scales)
-                groups.append(replace(group, odds=odds) if of_focal else group)
-        return [self.add_lasting(group) for group in groups]
+                columns = np.eye(self._unknowns.dense)[:, [self._places[number, p.name] for p in its]]
+                means = np.array([mean[LENS_NUMBERS.index(p.name)] for p in its])
+                group = self._group(columns, np.array([p.expected for p in its]), means, scales)
+                groups.append(self.add_lasting(replace(group, odds=odds)))
+        return groups
 
     def add_lasting(self, group: Group) -> Group:
         """Add an error of lens or field that has been the same since poses were stored.

@@ -35,7 +35,7 @@ def test_every_second_stretch_of_line_painted_aside_shows_in_the_difference_and_
     aside = Painted(painted.pitch, painted.lines, painted.there + 0.015 * odd[:, None] * painted.lines.normal)
     straight = checked(painted, np.random.default_rng(5), SHARED_PX)
     bent = checked(aside, np.random.default_rng(5), SHARED_PX)
-    assert bent.apart_m > 2 * straight.apart_m
+    assert bent.expected_m > 2 * straight.expected_m
     assert bent.apart_m > 1.5 * straight.expected_m
     assert bent.apart_m < 2 * bent.expected_m
 

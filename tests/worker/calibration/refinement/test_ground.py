@@ -11,6 +11,7 @@ from worker.calibration.geometry.camera import Camera, Pose
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.ground import Ground
 from worker.calibration.geometry.lens import Intrinsics
+from worker.calibration.geometry.parameters import field_parameters, lens_parameters, with_lens_changed
 from worker.calibration.refinement.refine import refine
 
 pytestmark = pytest.mark.slow
@@ -27,10 +28,18 @@ def hall_camera():
     return Camera("hall", Intrinsics(matrix, np.zeros(5), SIZE, {}), pose)
 
 
-def finished(court, painted, rng):
+def finished(court, painted, rng, real=None):
     camera = hall_camera()
-    sight = SimulatedSight(painted, [camera], 0.2 * rng.normal(size=(1, len(painted.lines))))
+    sight = SimulatedSight(painted, [real or camera], 0.2 * rng.normal(size=(1, len(painted.lines))))
     return refine(court, [camera], sight, 0.5).each[0]
+
+
+def drawn_as_expected(court, rng):
+    """A painted court and a camera whose numbers are all off by what is expected of them."""
+    painted, camera = Painted.drawn(court, rng), hall_camera()
+    there = painted.there + sum(p.expected * rng.normal() * p.shift for p in field_parameters(court))
+    lens = np.array([p.expected * rng.normal() for p in lens_parameters([camera])])
+    return replace(painted, there=there), with_lens_changed(camera, lens)
 
 
 def off_m(found):
@@ -39,7 +48,8 @@ def off_m(found):
 
 def test_in_a_hall_errors_are_as_large_as_the_sigmas_say():
     rng = np.random.default_rng(2)
-    ends = [finished(HALL, Painted.drawn(HALL, rng), rng) for _ in range(NIGHTS)]
+    nights = [drawn_as_expected(HALL, rng) for _ in range(NIGHTS)]
+    ends = [finished(HALL, painted, rng, camera) for painted, camera in nights]
     assert 0.4 < np.sqrt(np.mean([(off_m(end) / end.sigma.position_m) ** 2 for end in ends])) < 1.5
 
 

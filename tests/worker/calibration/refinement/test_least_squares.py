@@ -12,7 +12,7 @@ from worker.calibration.detection.line_measurement import PAINT_M
 from worker.calibration.geometry.derivatives import POSE_NUMBERS
 from worker.calibration.geometry.ground import Ground
 from worker.calibration.geometry.lens import Fisheye
-from worker.calibration.geometry.parameters import field_parameters, lens_parameters
+from worker.calibration.geometry.parameters import field_measures, field_parameters, lens_parameters
 from worker.calibration.refinement.least_squares import normal_equations, rows_of, weigh_rows
 from worker.calibration.refinement.unknowns import Unknowns
 
@@ -30,7 +30,7 @@ def fisheye():
 def test_the_offsets_change_with_lens_and_field_as_the_rows_say(of):
     one, lines = of(), CROWNED.line_points()
     found = measured(lines, one)
-    parameters = [*lens_parameters([one]), *field_parameters(CROWNED)]
+    parameters = [*lens_parameters([one]), *field_measures(CROWNED)]
     (rows,) = rows_of(lines.position, [one], [found], Unknowns(1, parameters, Ground.under(lines)))
 
     def offset(parameter, by):

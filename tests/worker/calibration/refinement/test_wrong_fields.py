@@ -1,0 +1,70 @@
+"""A field that is not as its venue says is named, and no lens is bent to make up for it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.benchmarks.nights.simulated import Painted, SimulatedSight
+from tests.worker.calibration.synthetic import CROWNED as PITCH
+from tests.worker.calibration.synthetic import camera
+from worker.calibration.geometry.parameters import FieldSkew
+from worker.calibration.refinement.diagnosis import find_suspicions
+from worker.calibration.refinement.refine import refine
+
+pytestmark = pytest.mark.slow
+
+FOCAL_PX, NOISE_PX = 2800.0, 0.2
+
+
+def found_on(displaced):
+    """The real camera over half a pitch, and what a search and a job make of it where lines lie `displaced` (N, 3)."""
+    rng = np.random.default_rng(11)
+    real = camera("half", (10.0, -55.0, 16.0), (26.0, 0.0), FOCAL_PX, size=(3840, 2160))
+    painted = Painted.drawn(PITCH, rng)
+    painted = replace(painted, there=painted.there + displaced(painted.lines))
+    sight = SimulatedSight(painted, [real], NOISE_PX * rng.normal(size=(1, len(painted.lines))))
+    found = real
+    for _ in range(3):
+        (found,) = refine(PITCH, [found], sight, 0.5, stored=[found]).cameras
+    return real, refine(PITCH, [found], sight, 0.5, stored=[found])
+
+
+def skewed(by_m):
+    return lambda lines: by_m * FieldSkew("skew_m", 1.0).around(PITCH, lines).shift
+
+
+def longer(by_m):
+    def displaced(lines):
+        there = PITCH.resized(length=PITCH.length + by_m)
+        return there.same_line_points(lines).position - lines.position
+
+    return displaced
+
+
+@pytest.mark.parametrize(
+    ("displaced", "name", "by_m"), [(skewed(0.15), "skew_m", 0.15), (longer(0.5), "length_m", 0.5)]
+)
+def test_what_is_off_is_named_and_the_sigma_covers_the_error(displaced, name, by_m):
+    real, said = found_on(displaced)
+    (found,) = said.each
+    (suspicion,) = find_suspicions(said.deviations)
+    assert suspicion.quantity == name
+    assert suspicion.deviation == pytest.approx(by_m, abs=3 * suspicion.sigma)
+    away_m = np.linalg.norm(found.camera.pose.position - real.pose.position)
+    assert 0.05 < away_m < 3 * found.sigma.position_m
+    refined_away_m = np.linalg.norm(found.refined.camera.pose.position - real.pose.position)
+    assert refined_away_m < 3 * found.refined.sigma.position_m
+    assert refined_away_m < away_m / 2
+
+
+def test_a_field_that_is_as_it_is_said_to_be_is_doubted_in_nothing():
+    real, said = found_on(lambda lines: np.zeros((len(lines), 3)))
+    assert find_suspicions(said.deviations) == []
+    assert np.linalg.norm(said.each[0].camera.pose.position - real.pose.position) < 0.05
+
+
+def test_how_far_out_of_square_a_field_is_cannot_be_written_into_it():
+    skew = FieldSkew("skew_m", 0.03)
+    with pytest.raises(NotImplementedError, match="skew_m"):
+        skew.applied([], PITCH, 0.1)
