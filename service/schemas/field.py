@@ -31,6 +31,8 @@ PitchPoint = Annotated[list[Annotated[Number, Field(ge=-200, le=200)]], Field(mi
 Length = Annotated[Number, Field(gt=0, le=400)]
 PaintWidth = Annotated[Number, Field(ge=0.01, le=1)]
 Colour = Annotated[str, StringConstraints(pattern=COLOUR_PATTERN)]
+# Who knows less of a field than this knows another one.
+MOST_SIGMA_M = 10.0
 # Further than this beside the field nothing counts as a marking of it.
 MARGIN_M = 2.0
 FOOTBALL = "football"
@@ -180,6 +182,13 @@ class FieldOfPlay(Schema):
         None,
         description="How far the ground is above or below its plane, or its roof: a standard deviation, m. Absent: as "
         "usual for the template (0.015 on turf, 0.005 in a hall), that of turf for markings of your own.",
+    )
+    sigma: dict[FieldNumber, Annotated[Number, Field(gt=0, le=MOST_SIGMA_M)]] = Field(
+        {},
+        description="How well numbers of the field are known: a standard deviation, m. Absent: as a tape that is "
+        "pulled with care leaves length and width (0.03 %), and 0.02 of a ridge. Say it where nobody has measured: "
+        "poses then say how far off that may put them.",
+        examples=[{"length_m": 0.5, "width_m": 0.5}],
     )
     other_markings: Annotated[list[OtherMarking], Field(max_length=500)] = Field(
         [],

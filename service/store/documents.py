@@ -32,7 +32,11 @@ class Added:
 
 TO_VENUES = Added(
     own=["view", "recover"],
-    of_parts={"alarms": ["trend_m", "knocked", "live"], "schedule": ["frames", "spacing_s"], "field": ["uneven_m"]},
+    of_parts={
+        "alarms": ["trend_m", "knocked", "live"],
+        "schedule": ["frames", "spacing_s"],
+        "field": ["uneven_m", "sigma"],
+    },
     of_cameras=["light"],
 )
 TO_RESULTS = Added(

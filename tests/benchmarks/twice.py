@@ -41,13 +41,20 @@ from worker.calibration.relocalisation.sought import SoughtCamera, SoughtLens
 @dataclass(frozen=True)
 class Mistake:
     """What is given wrong: numbers of the `lens` as in `lenses.py`, or a field that is really larger by parts of
-    `length` and `width`, or has its touchlines shifted by `skew_m` along themselves."""
+    `length` and `width`, said to be known to `sigma_m`, or has its touchlines shifted by `skew_m` along themselves."""
 
     name: str
     lens: Mapping[str, float] = field(default_factory=dict)
     length: float = 0.0
     width: float = 0.0
     skew_m: float = 0.0
+    sigma_m: float | None = None
+
+    @property
+    def pitch(self) -> Field:
+        """The field that is said."""
+        known = {} if self.sigma_m is None else {"length_m": self.sigma_m, "width_m": self.sigma_m}
+        return replace(PITCH, sigma=known)
 
     def given(self, real: Camera) -> Camera:
         """The camera with the lens that is said."""
@@ -64,15 +71,23 @@ MISTAKES = [
     Mistake("nothing"),
     *(Mistake(f"focal length {part:.1%}", {"focal": part}) for part in (0.001, 0.003, 0.01, 0.02)),
     *(Mistake(f"aspect {part:.2%}", {"aspect": part}) for part in (0.003, 0.0074, 0.01)),
-    *(Mistake(f"length and width {part:.1%}", length=part, width=part) for part in (0.005, 0.01)),
-    Mistake("100 x 64 m said to be 105 x 68", length=100 / 105 - 1, width=64 / 68 - 1),
+    *(
+        Mistake(f"length and width {part:.1%}{said}", length=part, width=part, sigma_m=sigma_m)
+        for part in (0.005, 0.01)
+        for said, sigma_m in (("", None), (", known to 1 m", 1.0))
+    ),
+    *(
+        Mistake(f"100 x 64 m said to be 105 x 68{said}", length=100 / 105 - 1, width=64 / 68 - 1, sigma_m=sigma_m)
+        for said, sigma_m in (("", None), (", known to 5 m", 5.0))
+    ),
+    Mistake("nothing, length and width known to 1 m", sigma_m=1.0),
     *(Mistake(f"skew {skew_m} m", skew_m=skew_m) for skew_m in (0.1, 0.2, 0.3)),
 ]
 LENS_MISTAKES = MISTAKES[:5]
 """Those that a rendered frame has."""
 STEPS = ("find", "job", "job", "job", "patch", "restore", "adopt", "adopt")
-REPAINTED = replace(PITCH, line_width=0.121)
-"""A field whose lines are said to be a millimetre wider: what was remembered is of another field."""
+REPAINTED_M = PITCH.line_width + 0.001
+"""Lines that are said to be a millimetre wider: what was remembered is of another field."""
 WIND_M, WIND_DEG, FOUND_M, FOUND_DEG = 0.005, 0.01, 0.02, 0.03
 NOISE = 2.5
 
@@ -140,8 +155,8 @@ def _measured(focal: float, view: str, mistake: Mistake) -> list[Answer]:
         swayed = real.with_pose(outdated(real.pose, WIND_M, WIND_DEG, rng))
         return SimulatedSight.of_night(painted, [swayed], shared, rng)
 
-    def night(pitch: Field, stored: Camera, memory: CameraMemory | None) -> tuple[CameraResult, CameraMemory | None]:
-        venue = Installation(pitch, [stored], [memory])
+    def night(width_m: float, stored: Camera, memory: CameraMemory | None) -> tuple[CameraResult, CameraMemory | None]:
+        venue = Installation(replace(mistake.pitch, line_width=width_m), [stored], [memory])
         (result,) = venue.night(tonight())
         return result, venue.memories[0]
 
@@ -153,9 +168,9 @@ def _measured(focal: float, view: str, mistake: Mistake) -> list[Answer]:
     aside = outdated(replace(real.pose, position=suited), FOUND_M, FOUND_DEG, rng)
     found, sight = begun.with_pose(aside), tonight()
     for _ in range(3):
-        (found,) = refine(PITCH, [found], sight, 0.5, stored=[found]).cameras
-    finished = refine(PITCH, [found], sight, 0.5, stored=[found])
-    (result,) = Installation(PITCH, [found]).night(sight)
+        (found,) = refine(mistake.pitch, [found], sight, 0.5, stored=[found]).cameras
+    finished = refine(mistake.pitch, [found], sight, 0.5, stored=[found])
+    (result,) = Installation(mistake.pitch, [found]).night(sight)
     doubts = find_suspicions(finished.deviations)
     is_found = result.accepted and why_lens_unfit(result, doubts) is None
     answer = replace(Answer.of(result, real), accepted=is_found)
@@ -172,8 +187,9 @@ def _rendered(focal: float, view: str, mistake: Mistake) -> list[Answer]:
         noisy = frame + np.float32(NOISE) * rng.standard_normal(frame.shape, dtype=np.float32)
         return np.clip(noisy + 0.5, 0, 255).astype(np.uint8)
 
-    def night(pitch: Field, stored: Camera, memory: CameraMemory | None) -> tuple[CameraResult, CameraMemory | None]:
+    def night(width_m: float, stored: Camera, memory: CameraMemory | None) -> tuple[CameraResult, CameraMemory | None]:
         memories = {} if memory is None else {real.id: memory}
+        pitch = replace(PITCH, line_width=width_m)
         said = calibrate(pitch, [stored], {real.id: [tonight()]}, seen.segmenter, Options(), memories=memories)
         return said.cameras[0], said.memories.get(real.id, memory)
 
@@ -197,7 +213,7 @@ def _on_this_side(found: Camera, real: Camera) -> Camera:
 def _later(
     found: Camera,
     real: Camera,
-    night: Callable[[Field, Camera, CameraMemory | None], tuple[CameraResult, CameraMemory | None]],
+    night: Callable[[float, Camera, CameraMemory | None], tuple[CameraResult, CameraMemory | None]],
 ) -> Iterator[Answer]:
     """What comes after a venue was stored as it was found."""
     stored, memory = found, None
@@ -209,7 +225,7 @@ def _later(
             # As the service does it: a lens that is stored does not bring the certainty that the lines gave it.
             lens = replace(refined.intrinsics, sigma=found.intrinsics.sigma)
             stored, refined = refined.with_lens(lens), None
-        result, memory = night(REPAINTED if step == "patch" else PITCH, stored, memory)
+        result, memory = night(REPAINTED_M if step == "patch" else PITCH.line_width, stored, memory)
         if result.accepted:
             stored = result.camera
             refined = result.refined.camera if step == "restore" and result.refined else None

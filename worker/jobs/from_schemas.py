@@ -76,7 +76,8 @@ def pitch_of(field: FieldOfPlay) -> Field:
     """The engine's pitch."""
     ridge = None if field.ridge is None else np.array(field.ridge)
     size = field.length_m, field.width_m, field.line_width_m
-    return Field(*size, ridge, field.plan, field.measures_m, others=field.others)
+    sigma: dict[str, float] = dict(field.sigma.items())
+    return Field(*size, ridge, field.plan, field.measures_m, others=field.others, sigma=sigma)
 
 
 def lens_of(lens: Intrinsics, image_size: list[int]) -> Lens:

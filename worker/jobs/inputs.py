@@ -84,6 +84,7 @@ class FieldOfPlay(Record):
     measures_m: dict[str, float]
     ridge: list[list[float]] | None
     uneven_m: float | None
+    sigma: dict[str, float]
     other_markings: list[dict[str, Any]]
 
     @property

@@ -44,6 +44,14 @@ def test_a_ground_is_as_uneven_as_usual_in_its_sport_unless_said():
         FieldOfPlay(uneven_m=0.5)
 
 
+def test_how_well_a_field_is_known_is_said_by_the_names_of_its_numbers():
+    assert FieldOfPlay(sigma={"length_m": 0.5}).sigma == {"length_m": 0.5}
+    assert FieldOfPlay().sigma == {}
+    for wrong in ({"line_width_m": 0.01}, {"length_m": 0}, {"width_m": 11}):
+        with pytest.raises(ValidationError):
+            FieldOfPlay(sigma=wrong)
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_a_template_brings_its_size(name):
     field = FieldOfPlay(template=name)

@@ -43,7 +43,7 @@ def everything():
         "schedule": {"cron": "0 3 * * *", "frames": 4, "options": {"seed": 3}},
         "webhooks": [{"url": "https://example.com/"}],
     }
-    put["field"]["uneven_m"] = 0.004
+    put["field"] |= {"uneven_m": 0.004, "sigma": {"width_m": 0.2}}
     put["cameras"] = [camera | {"source": "http://10.1.0.7/a.jpg"} for camera in put["cameras"]]
     put["cameras"][0]["light"] = LIGHT.model_dump()
     return VenueIn.model_validate(put).to_venue()
@@ -82,7 +82,7 @@ def test_0_1_0_can_read_the_document_of_a_venue_and_nothing_of_it_is_lost():
         "of_parts": {
             "alarms": {"trend_m": 0.2, "knocked": True},
             "schedule": {"frames": 4},
-            "field": {"uneven_m": 0.004},
+            "field": {"uneven_m": 0.004, "sigma": {"width_m": 0.2}},
         },
         "of_cameras": {"left": {"light": {"gain": [1.1, 1.0, 0.9]}}},
     }

@@ -91,6 +91,7 @@ def given_task() -> task.Task:
     document["field"] |= {
         "template": {"markings": markings, "points": {"middle": [0, 0]}},
         "uneven_m": 0.01,
+        "sigma": {"length_m": 0.5},
         "other_markings": [markings[2], {"template": "handball", "centre": [3, 1], "turned_deg": 90}],
     }
     stored = VenueIn.model_validate(document).to_venue()

@@ -246,7 +246,7 @@ def alone_rejection(result: CameraResult, gate: Gate) -> Refusal | None:
 
 
 def _why_undetermined(ground: GroundSigma | None, gate: Gate) -> str | None:
-    advice = "let the camera see lines in more than one direction, or calibrate its lens again"
+    advice = "let the camera see lines in more than one direction, or measure lens or field again"
     if ground is None:
         return f"no marking is in view where the pose puts the camera; {advice}"
     metres, pixels, beyond = ground.worst(gate.largest_ground_sigma_m, gate.largest_ground_sigma_px)

@@ -87,6 +87,7 @@ class Field:
 
     `ridge`: the paper's p and p', (2, 3), same y and same z; None = flat. `dashed`: the size whose dashes its broken
     lines have, as many and stretched with them; None = its own. `others`: what else is painted there, of no use.
+    `sigma`: how well numbers of it are known, m, by the names of `parameters.field_measures`.
     """
 
     length: float
@@ -97,6 +98,7 @@ class Field:
     measures: Mapping[str, float] = field(default_factory=dict)
     dashed: Mapping[str, float] | None = None
     others: Sequence[Shape] = ()
+    sigma: Mapping[str, float] = field(default_factory=dict)
 
     def resized(self, *, length: float | None = None, width: float | None = None) -> Field:
         """The same pitch with another length or width, point by point: with as many dashes."""

@@ -27,6 +27,8 @@ FREE_FOCAL, FREE_CENTRE, FREE_BEND = 0.1, 20 / 3840, 0.05
 width, and k1 and k2 at half the width of the frame."""
 TAPE = 3e-4
 """What a tape that is pulled with care is off by, part of what it measures: 3 cm on a football pitch."""
+LEVELLED_M = 0.02
+"""What a level leaves of the height of a ridge."""
 FREE_LENGTH_M, FREE_WIDTH_M = 5.0, 5.0
 """Pitches for matches are 90 to 120 m long and 45 to 90 m wide, and mostly near 105 m and 68 m."""
 
@@ -54,7 +56,7 @@ class LensParameter:
 
 @dataclass(frozen=True)
 class FieldParameter:
-    """A number of the field, metres. `expected`: how far off one that was measured with care is.
+    """A number of the field, metres. `expected`: how far off it may be.
 
     `shift` (N, 3): how the line points move, metres per metre.
     """
@@ -182,18 +184,29 @@ def free_lens_sigma(lens: Lens) -> dict[str, float]:
     }
 
 
+def careful_measurement(pitch: Field) -> dict[str, float]:
+    """How far off (m) numbers of a field are that were measured with care; right angles are laid out by diagonals."""
+    return {
+        "ridge_height_m": LEVELLED_M,
+        "length_m": TAPE * pitch.length,
+        "width_m": TAPE * pitch.width,
+        "skew_m": TAPE * hypot(pitch.length, pitch.width),
+    }
+
+
 def field_measures(pitch: Field) -> list[FieldMeasure]:
-    """What is measured once when a venue is set up."""
+    """What is measured once when a venue is set up: as well as the field says (`Field.sigma`), or with care."""
+    known = careful_measurement(pitch) | dict(pitch.sigma)
     return [
-        _ridge_height(pitch, 0.02),
-        _length(pitch, TAPE * pitch.length),
-        _width(pitch, TAPE * pitch.width),
+        _ridge_height(pitch, known["ridge_height_m"]),
+        _length(pitch, known["length_m"]),
+        _width(pitch, known["width_m"]),
     ]
 
 
 def field_parameters(pitch: Field) -> list[FieldParameter]:
-    """What may be off of a field: its measures, and its right angles, which are laid out by diagonals."""
-    skew = FieldSkew("skew_m", TAPE * hypot(pitch.length, pitch.width))
+    """What may be off of a field: its measures, and its right angles."""
+    skew = FieldSkew("skew_m", careful_measurement(pitch)["skew_m"])
     return [*field_measures(pitch), skew.around(pitch, pitch.line_points())]
 
 

@@ -26,6 +26,7 @@ from worker.calibration.geometry.parameters import (
     HEAT_FOCAL,
     LensParameter,
     Parameter,
+    careful_measurement,
     lens_parameters,
     with_focal_length,
     with_lens_changed,
@@ -429,13 +430,13 @@ class _Judgement:
 
     def _of_field(self, solved: Unknowns) -> list[Deviation]:
         first, free = POSE_NUMBERS * self.believed.unknowns.views, {p.name for p in solved.parameters}
-        told = []
+        told, care = [], careful_measurement(self.here.pitch)
         for at, parameter in enumerate(self.believed.unknowns.parameters, first):
             if isinstance(parameter, LensParameter) or parameter.name in free:
                 continue
             row = self.believed.mixing[at]
             value, sigma = float(row @ self.value), float(np.sqrt(row @ self.covariance @ row))
-            told.append(Deviation(None, parameter.name, value, sigma, parameter.expected))
+            told.append(Deviation(None, parameter.name, value, sigma, care[parameter.name]))
         return told
 
     def _parameter_uncertainty(self, number: int) -> ParameterUncertainty:

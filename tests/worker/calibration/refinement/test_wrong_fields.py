@@ -14,20 +14,21 @@ from worker.calibration.refinement.refine import refine
 
 pytestmark = pytest.mark.slow
 
-FOCAL_PX, NOISE_PX = 2800.0, 0.2
+NOISE_PX = 0.2
+HALF = camera("half", (10.0, -55.0, 16.0), (26.0, 0.0), 2800.0, size=(3840, 2160))
+BOX = camera("box", (40.0, -55.0, 16.0), (44.0, 0.0), 6000.0, size=(3840, 2160))
 
 
-def found_on(displaced):
-    """The real camera over half a pitch, and what a search and a job make of it where lines lie `displaced` (N, 3)."""
+def found_on(displaced, pitch=PITCH, real=HALF):
+    """The real camera, and what a search and a job make of it where lines lie `displaced` (N, 3)."""
     rng = np.random.default_rng(11)
-    real = camera("half", (10.0, -55.0, 16.0), (26.0, 0.0), FOCAL_PX, size=(3840, 2160))
     painted = Painted.drawn(PITCH, rng)
     painted = replace(painted, there=painted.there + displaced(painted.lines))
     sight = SimulatedSight(painted, [real], NOISE_PX * rng.normal(size=(1, len(painted.lines))))
     found = real
     for _ in range(3):
-        (found,) = refine(PITCH, [found], sight, 0.5, stored=[found]).cameras
-    return real, refine(PITCH, [found], sight, 0.5, stored=[found])
+        (found,) = refine(pitch, [found], sight, 0.5, stored=[found]).cameras
+    return real, refine(pitch, [found], sight, 0.5, stored=[found])
 
 
 def skewed(by_m):
@@ -56,6 +57,24 @@ def test_what_is_off_is_named_and_the_sigma_covers_the_error(displaced, name, by
     refined_away_m = np.linalg.norm(found.refined.camera.pose.position - real.pose.position)
     assert refined_away_m < 3 * found.refined.sigma.position_m
     assert refined_away_m < away_m / 2
+
+
+def test_a_number_that_is_said_to_be_unsure_is_named_as_surely():
+    _, said = found_on(longer(0.5), replace(PITCH, sigma={"length_m": 0.5}))
+    (suspicion,) = find_suspicions(said.deviations)
+    assert (suspicion.quantity, suspicion.deviation) == ("length_m", pytest.approx(0.5, abs=0.05))
+
+
+def test_where_one_box_is_seen_the_pose_is_as_sure_as_the_field_is_said_to_be():
+    aside = longer(0.5)
+    sigmas_m = []
+    for known_m in (0.03, 0.5):
+        real, said = found_on(aside, replace(PITCH, sigma={"length_m": known_m}), BOX)
+        away_m = np.linalg.norm(said.each[0].camera.pose.position - real.pose.position)
+        assert away_m == pytest.approx(0.25, abs=0.05)
+        sigmas_m.append(said.each[0].sigma.position_m)
+    assert sigmas_m[0] < away_m / 3
+    assert sigmas_m[1] > away_m / 2
 
 
 def test_a_field_that_is_as_it_is_said_to_be_is_doubted_in_nothing():
