@@ -9,6 +9,7 @@ import ssl
 import threading
 from base64 import b64encode
 from contextlib import suppress
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +37,8 @@ class StubCamera:
         threading.Thread(target=self._accept, daemon=True).start()
 
     def close(self) -> None:
+        # A thread that waits for the next connection is woken by it.
+        self._listener.shutdown(socket.SHUT_RDWR)
         self._listener.close()
 
     def _accept(self) -> None:
@@ -48,7 +51,7 @@ class StubCamera:
         with suppress(OSError):
             connection = self._tls.wrap_socket(connection, server_side=True) if self._tls else connection
         with connection, suppress(OSError), connection.makefile("rb") as lines:
-            while head := b"".join(iter(lines.readline, b"\r\n")).decode():
+            while head := b"".join(takewhile(lambda line: line not in (b"", b"\r\n"), lines)).decode():
                 connection.sendall(self._answer(head))
                 if not self._dialect.get("keeps"):
                     return

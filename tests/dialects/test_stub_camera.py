@@ -1,0 +1,16 @@
+"""The stub camera of the dialects: it ends with the test that it is for."""
+
+import socket
+import threading
+
+from tests.dialects.stub_camera import StubCamera
+from tests.e2e.running import wait_for
+
+
+def test_a_stub_that_is_closed_leaves_no_thread():
+    before = set(threading.enumerate())
+    camera = StubCamera({"answer": "HTTP/1.1 204 No Content\n\n", "keeps": True})
+    with socket.create_connection(("127.0.0.1", camera.port)) as half_asked:
+        half_asked.sendall(b"GET / HTTP/1.1\r\n")
+    camera.close()
+    wait_for(lambda: set(threading.enumerate()) <= before, 10)
