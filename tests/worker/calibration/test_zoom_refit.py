@@ -56,7 +56,7 @@ def test_a_lens_that_nobody_vouches_for_leaves_open_how_far_off_a_camera_stands_
     unstated = moved(plane(), *WIND)
     (found,) = calibrate(CROWNED, [unstated], {"tele": [picture()]}, white_on_green, Options(seed=1)).cameras
     assert found.accepted
-    assert stated.sigma.position_m < 0.05 < 0.1 < found.sigma.position_m < 0.3
+    assert stated.sigma.position_m < 0.08 < 0.1 < found.sigma.position_m < 0.3
 
 
 @pytest.mark.parametrize("longer", [ZOOM, -ZOOM])
