@@ -151,3 +151,8 @@ def grave(page: Page) -> list[str]:
         for scheme, one in found
         if one["impact"] in ("serious", "critical")
     ]
+
+
+def list_from(venue: str) -> str:
+    """Where the list of venues begins about with this one: other tests have made more than its first page has."""
+    return f"/?after={venue[:-1]}"

@@ -7,7 +7,7 @@ import pytest
 from playwright.sync_api import expect
 
 from tests.e2e.running import Service, venue
-from tests.pages.browsing import in_each_scheme, wait_until
+from tests.pages.browsing import in_each_scheme, list_from, wait_until
 
 # While a service is away, a browser says so at each try; and of what it was loading when the service was killed.
 AWAY = (
@@ -196,7 +196,7 @@ def test_a_job_shows_its_end_on_a_page_that_a_download_was_begun_from(stub, visi
 
 def test_the_list_of_venues_goes_on_while_a_link_of_it_has_the_focus(stub, visit):
     stub.venue("chosen")
-    page = visit(stub.url)
+    page = visit(stub.url, list_from("chosen"))
     page.locator("a[href='/ui/venues/chosen']").focus()
     stub.calibrated("chosen")
     expect(page.locator(".venue-row", has=page.locator("a[href='/ui/venues/chosen']")).locator(".badge")).to_have_text(

@@ -7,7 +7,7 @@ from playwright.sync_api import expect
 
 from tests.e2e import running
 from tests.e2e.running import SIZE, Service, png, wait_for
-from tests.pages.browsing import differs, grave, look, press_and_confirm, tab, wait_until
+from tests.pages.browsing import differs, grave, list_from, look, press_and_confirm, tab, wait_until
 from tests.pages.stocked import calibrations
 
 DESK, PHONE = {"width": 1280, "height": 900}, {"width": 390, "height": 800}
@@ -63,19 +63,14 @@ def test_an_empty_service_says_what_to_do(start_empty, visit):
     expect(page.get_by_role("link", name="New venue")).to_be_visible()
 
 
-def before(venue):
-    """The page of the list that begins about with a venue: other tests have made more than fit on the first one."""
-    return f"/?after={venue[:-1]}"
-
-
 def test_the_list_shows_each_venue_with_its_last_result(stub, ended, years, visit):
     for venue, says in (("fine", "Accepted"), ("poor", "Rejected"), ("broken", "Failed")):
-        page = visit(stub.url, before(venue))
+        page = visit(stub.url, list_from(venue))
         row = page.locator(".venue-row", has=page.locator(f"a[href='/ui/venues/{venue}']"))
         expect(row.locator(".badge")).to_have_text(says)
         # Whatever a calibration found: none that was refused has moved a camera.
         expect(row.locator("dd").last).to_have_text("1.00 px" if says == "Accepted" else "–")
-    page = visit(stub.url, before("years"))
+    page = visit(stub.url, list_from("years"))
     row = page.locator(".venue-row", has=page.locator("a[href='/ui/venues/years']"))
     expect(row.get_by_role("img", name="Stitch error")).to_be_visible()
 
@@ -87,7 +82,7 @@ def test_the_list_says_what_was_decided_since_the_last_calibration(stub, visit, 
     name = stub.venue(f"decided-{decision}", behaviour)
     job = stub.calibrated(name)["id"]
     stub.http.post(f"/jobs/{job}/{decision}").raise_for_status()
-    page = visit(stub.url, before(name))
+    page = visit(stub.url, list_from(name))
     row = page.locator(".venue-row", has=page.locator(f"a[href='/ui/venues/{name}']"))
     expect(row.locator(".badge")).to_have_text(says)
     stub.calibrated(name, shade=1, dry_run=True)
