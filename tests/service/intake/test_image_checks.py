@@ -156,18 +156,18 @@ SMALL_PARTS = {
 def test_a_file_of_a_million_small_parts_is_refused_in_no_time(kind):
     make, why = SMALL_PARTS[kind]
     data = make()
-    begun = time.thread_time()
+    begun = time.process_time()
     with pytest.raises(Problem, match=why) as refused:
         check(data)
     assert refused.value.kind == "broken-image"
-    assert time.thread_time() - begun < 0.5
+    assert time.process_time() - begun < 0.5
 
 
 def test_forty_megabytes_of_fill_bytes_are_passed_over_in_no_time():
     data = segments(1, b"\xff" * 40_000_000)
-    begun = time.thread_time()
+    begun = time.process_time()
     check(data)
-    assert time.thread_time() - begun < 1
+    assert time.process_time() - begun < 1
 
 
 def test_as_many_parts_as_encoders_write_pass():
