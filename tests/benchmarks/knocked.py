@@ -164,7 +164,7 @@ def _called_row(name: str, number: int, engine: Engine) -> dict:
         axis = np.array([0.0, 0.0, rng.choice([-1.0, 1.0])]) if is_rolled else rng.normal(size=3)
         turn = np.radians(rng.uniform(LEAST_TURN_DEG, MOST_DEG)) * axis / np.linalg.norm(axis)
         position = truth.pose.position + rng.normal(0, SHIFT_M, 3)
-        before = truth.with_pose(Pose(rotation_vectors(rotation_matrices(turn) @ truth.pose.matrix), position))
+        before = _turned_by(truth, turn, position)
         if _sees_markings(pitch, before):
             break
     answer = engine(pitch, [before, *others], frames, number)
@@ -260,9 +260,13 @@ def _before_a_knock(pitch: Field, camera: Camera, rng: np.random.Generator) -> C
         turn = np.radians(rng.uniform(LEAST_DEG, MOST_DEG)) * axis / np.linalg.norm(axis)
         way = rng.normal(size=3)
         position = camera.pose.position + rng.uniform(0, MOST_M) * way / np.linalg.norm(way)
-        before = camera.with_pose(Pose(rotation_vectors(rotation_matrices(turn) @ camera.pose.matrix), position))
+        before = _turned_by(camera, turn, position)
         if position[2] > 0 and _sees_markings(pitch, before):
             return before
+
+
+def _turned_by(camera: Camera, turn: np.ndarray, position: np.ndarray) -> Camera:
+    return camera.with_pose(Pose(rotation_vectors(rotation_matrices(turn) @ camera.pose.matrix), position))
 
 
 def _sees_markings(pitch: Field, camera: Camera) -> bool:
