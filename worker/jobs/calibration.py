@@ -200,11 +200,11 @@ def _adoptable(venue: Venue, found: engine.Calibration) -> list[AdoptableNumber]
 
     None where a venue with a ridge was calibrated as if it were flat: they are numbers of another field.
     """
-    given = {measure.name: measure.read(found.pitch) for measure in field_measures(found.pitch)}
-    of_field = [one for one in found.suspicions if one.camera is None and one.quantity in given]
+    of_field = [one for one in found.suspicions if one.camera is None]
     if not of_field or (found.pitch.ridge is None and venue.field.ridge is not None):
         return []
     accepted = {camera.camera.id for camera in found.cameras if camera.accepted}
+    given = {measure.name: measure.read(found.pitch) for measure in field_measures(found.pitch)}
     return [
         AdoptableNumber(
             name=one.quantity,
@@ -214,6 +214,7 @@ def _adoptable(venue: Venue, found: engine.Calibration) -> list[AdoptableNumber]
             moves_m={camera: round(by, MILLIMETRE) for camera, by in one.moves_m.items() if camera in accepted},
         )
         for one in of_field
+        if one.quantity in given
     ]
 
 

@@ -87,7 +87,7 @@ class Field:
 
     `ridge`: the paper's p and p', (2, 3), same y and same z; None = flat. `dashed`: the size whose dashes its broken
     lines have, as many and stretched with them; None = its own. `others`: what else is painted there, of no use.
-    `sigma`: how well numbers of it are known, m, by the names of `parameters.field_measures`.
+    `sigma`: how well numbers of it are known, m, by the names of `parameters.field_parameters`.
     """
 
     length: float

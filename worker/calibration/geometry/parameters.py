@@ -26,9 +26,10 @@ FREE_FOCAL, FREE_CENTRE, FREE_BEND = 0.1, 20 / 3840, 0.05
 """How far off the numbers of a lens may be that is found with a pose: part of the focal length, part of the frame's
 width, and k1 and k2 at half the width of the frame."""
 TAPE = 3e-4
-"""What a tape that is pulled with care is off by, part of what it measures: 3 cm on a football pitch."""
+"""Prior sigma of length, width and diagonal, part of each: a tape that is pulled with care. From the 3 cm that were
+taken for a football pitch of 105 m; no bench has chosen it."""
 LEVELLED_M = 0.02
-"""What a level leaves of the height of a ridge."""
+"""Prior sigma of the height of a ridge: a level over half a pitch. No bench has chosen it."""
 FREE_LENGTH_M, FREE_WIDTH_M = 5.0, 5.0
 """Pitches for matches are 90 to 120 m long and 45 to 90 m wide, and mostly near 105 m and 68 m."""
 
@@ -67,7 +68,7 @@ class FieldParameter:
     lines: LinePoints | None = field(default=None, kw_only=True)
 
     def around(self, pitch: Field, lines: LinePoints) -> Self:
-        """The same number as it moves `lines` of a pitch that may have been changed since."""
+        """Return this parameter with its `shift` for `lines` of a pitch that may have been changed since."""
         return self if lines is self.lines else replace(self, shift=self._shift_of(pitch, lines), lines=lines)
 
     def applied(self, cameras: Sequence[Camera], pitch: Field, by: float) -> tuple[list[Camera], Field]:
@@ -99,7 +100,7 @@ class FieldMeasure(FieldParameter):
 
 @dataclass(frozen=True)
 class FieldSkew(FieldParameter):
-    """How far each touchline is shifted along itself, the far one to the right: of a field that is out of square.
+    """The skew of a field out of square: each touchline is shifted along itself by it, the far one to the right.
 
     No venue can have one: it is named, and explains what else would bend the lenses.
     """
@@ -185,7 +186,7 @@ def free_lens_sigma(lens: Lens) -> dict[str, float]:
 
 
 def careful_measurement(pitch: Field) -> dict[str, float]:
-    """How far off (m) numbers of a field are that were measured with care; right angles are laid out by diagonals."""
+    """Return the sigma (m) of numbers of a field that were measured with care; diagonals give the right angles."""
     return {
         "ridge_height_m": LEVELLED_M,
         "length_m": TAPE * pitch.length,
@@ -195,8 +196,8 @@ def careful_measurement(pitch: Field) -> dict[str, float]:
 
 
 def field_measures(pitch: Field) -> list[FieldMeasure]:
-    """What is measured once when a venue is set up: as well as the field says (`Field.sigma`), or with care."""
-    known = careful_measurement(pitch) | dict(pitch.sigma)
+    """Return the measures of a pitch, as uncertain as `Field.sigma` says or as a careful measurement leaves them."""
+    known = _known(pitch)
     return [
         _ridge_height(pitch, known["ridge_height_m"]),
         _length(pitch, known["length_m"]),
@@ -205,9 +206,13 @@ def field_measures(pitch: Field) -> list[FieldMeasure]:
 
 
 def field_parameters(pitch: Field) -> list[FieldParameter]:
-    """What may be off of a field: its measures, and its right angles."""
-    skew = FieldSkew("skew_m", careful_measurement(pitch)["skew_m"])
+    """Return the numbers of a pitch that may be wrong: its measures and its skew."""
+    skew = FieldSkew("skew_m", _known(pitch)["skew_m"])
     return [*field_measures(pitch), skew.around(pitch, pitch.line_points())]
+
+
+def _known(pitch: Field) -> dict[str, float]:
+    return careful_measurement(pitch) | dict(pitch.sigma)
 
 
 def with_focal_length(camera: Camera, longer_px: float) -> Camera:

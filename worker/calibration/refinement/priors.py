@@ -45,8 +45,6 @@ UNSTATED_ODDS, STATED_ODDS = FOCAL_SCALES**0.0, FOCAL_SCALES**-3.0
 another; a sigma that was said is wrong twofold one time in nine."""
 LENS_SCALES: Array = 2.0 ** np.arange(6.0)
 """... and nothing moves the rest of a lens so far; but what squeezes pictures moves the aspect by as much."""
-FOCAL, ASPECT, REST = {LENS_NUMBERS[0]}, {LENS_NUMBERS[3]}, set(LENS_NUMBERS) - {LENS_NUMBERS[0], LENS_NUMBERS[3]}
-"""Numbers of a lens that go wrong together."""
 FIELD_SCALES: Array = 2.0 ** np.arange(-3.0, 7.0)
 """A measure of the field may have been taken better than expected, or worse, ..."""
 FIELD_ODDS = np.minimum(FIELD_SCALES, 1 / FIELD_SCALES) ** 3.0
@@ -233,9 +231,9 @@ class _Errors:
         is_stated = any(name in self._cameras[number].intrinsics.sigma for name in ("fx", "fy"))
         groups = []
         for names, scales, odds in (
-            (FOCAL, FOCAL_SCALES, STATED_ODDS if is_stated else UNSTATED_ODDS),
-            (ASPECT, FOCAL_SCALES, STATED_ODDS),
-            (REST, LENS_SCALES, None),
+            ({"focal_length_px"}, FOCAL_SCALES, STATED_ODDS if is_stated else UNSTATED_ODDS),
+            ({"aspect"}, FOCAL_SCALES, STATED_ODDS),
+            (set(LENS_NUMBERS) - {"focal_length_px", "aspect"}, LENS_SCALES, None),
         ):
             its = [p for p in known if p.name in names]
             if its:

@@ -19,7 +19,7 @@ from worker.calibration.detection.line_measurement import LineProfiles, Measurem
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.field import Field, LinePoints
 from worker.calibration.geometry.ground import Ground
-from worker.calibration.geometry.parameters import FieldMeasure, Parameter, field_measures
+from worker.calibration.geometry.parameters import Parameter, field_measures
 from worker.calibration.memory.camera_memory import CameraMemory, memories_of_field
 from worker.calibration.memory.repainted_markings import find_repainted_markings
 from worker.calibration.refinement.anderson_mixing import MixedSteps
@@ -326,20 +326,21 @@ def _assessed(
 def _with_moves(finished: RefinedPoses, here: Estimate, finish: _Finish) -> RefinedPoses:
     """The same, and of each number of the field that the lines contradict how far it moves the cameras, put right."""
     measured = finish.but_anew([one.measured for one in finished.each if one.measured is not None])
-    measures = {measure.name: measure for measure in field_measures(here.pitch)}
     deviations = [
-        replace(one, moves_m=_moves_m(one, measures[one.name], here, measured, finish))
-        if one.camera is None and one.name in measures and is_sure(one)
-        else one
+        replace(one, moves_m=_moves_m(one, here, measured, finish)) if one.camera is None and is_sure(one) else one
         for one in finished.deviations
     ]
     return replace(finished, deviations=deviations)
 
 
-def _moves_m(
-    wrong: Deviation, measure: FieldMeasure, here: Estimate, measured: Sequence[Measurements], finish: _Finish
-) -> dict[str, float]:
-    """How far each camera moves (m) on the same measurements with a measure of the field put right, by id."""
+def _moves_m(wrong: Deviation, here: Estimate, measured: Sequence[Measurements], finish: _Finish) -> dict[str, float]:
+    """Return the move (m) of each camera, by id, on the same measurements with a measure of the field corrected.
+
+    Nothing for a number that no field can have otherwise.
+    """
+    measure = next((one for one in field_measures(here.pitch) if one.name == wrong.name), None)
+    if measure is None:
+        return {}
     _, pitch = measure.applied(here.cameras, here.pitch, wrong.value)
     there = replace(here, pitch=pitch, lines=pitch.same_line_points(here.lines))
     finish = finish.around(there)

@@ -98,7 +98,7 @@ class Sigma:
 
 @dataclass(frozen=True)
 class GroundSigma:
-    """How far from their places the markings in view may be put: one standard deviation, by marking.
+    """The uncertainty of where markings in view are placed: one standard deviation for each of N line points.
 
     `metres` (N,) on the ground, `pixels` (N,) in the picture.
     """

@@ -60,7 +60,7 @@ def test_errors_as_large_as_expected_spread_poses_as_far_as_is_said():
 
 def said_of_a_corner(sigma_from=None, **sigma):
     """How sure (m) a long camera is that moved and now sees one corner of a court, its lens known so well."""
-    court = Field(40.0, 20.0, 0.05, template=load("handball"))
+    court = Field(40.0, 20.0, 0.05, template=load("handball"), sigma={"skew_m": 1e-4})
     one = camera("left", (-9.0, -35.0, 9.0), (-20.0, 10.0), focal=3000.0)
     one = one.with_lens(replace(one.intrinsics, sigma=sigma, sigma_from=sigma_from))
     lines = court.line_points()
@@ -92,15 +92,15 @@ def test_the_worse_the_focal_length_is_known_the_less_sure_is_where_a_camera_sta
     well, badly, hardly = (said_of_a_corner(fx=fx) for fx in (0.1, 30.0, 150.0))
     assert well < badly < hardly
     # Of a lens that nobody vouches for the lines alone say how long it is.
-    assert said_of_a_corner() > 1.5 * well
-    assert hardly > 2 * well
+    assert said_of_a_corner() > 3 * well
+    assert badly > 3 * well
     assert said_of_a_corner(fy=150.0) == hardly
 
 
 @pytest.mark.usefixtures("without_heat")
 @pytest.mark.parametrize("sigma", [{"aspect": 0.01}, {"cx": 30.0, "cy": 30.0}, {"k1": 0.1}])
 def test_what_else_of_a_lens_is_known_badly_makes_a_camera_less_sure_too(sigma):
-    assert said_of_a_corner(fx=0.1, **sigma) > 1.05 * said_of_a_corner(fx=0.1)
+    assert said_of_a_corner(fx=0.1, **sigma) > 1.1 * said_of_a_corner(fx=0.1)
 
 
 def test_the_sigma_of_a_lens_that_lines_found_is_not_counted_beside_those_lines():
