@@ -11,6 +11,7 @@ from __future__ import annotations
 import asyncio
 import secrets
 import threading
+import weakref
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -51,6 +52,9 @@ class Relay:
         # Other users of this machine reach the port as well.
         self._token = secrets.token_urlsafe(16)
         self._loop = asyncio.new_event_loop()
+        self._end = asyncio.Event()
+        self._talks: set[asyncio.Task[None]] = set()
+        self._transports: weakref.WeakSet[asyncio.WriteTransport] = weakref.WeakSet()
         self._listening = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True, name="rtsp-relay")
         self._here = ""
@@ -63,7 +67,7 @@ class Relay:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._loop.call_soon_threadsafe(self._loop.stop)
+        self._loop.call_soon_threadsafe(self._end.set)
         self._thread.join(STARTING_S)
 
     @property
@@ -77,17 +81,31 @@ class Relay:
         return self._why
 
     def _run(self) -> None:
-        asyncio.set_event_loop(self._loop)
-        server = self._loop.run_until_complete(asyncio.start_server(self._serve, "127.0.0.1", 0, limit=LONGEST_HEAD))
+        with asyncio.Runner(loop_factory=lambda: self._loop) as runner:
+            runner.run(self._relay())
+
+    async def _relay(self) -> None:
+        server = await asyncio.start_server(self._accept, "127.0.0.1", 0, limit=LONGEST_HEAD)
         self._here = f"rtsp://127.0.0.1:{server.sockets[0].getsockname()[1]}/{self._token}"
         self._listening.set()
-        self._loop.run_forever()
+        await self._end.wait()
+        # A connection may be about to be accepted: its talk begins while the others end, and asyncio leaves it open where
+        # the server is closed by then.
+        while others := asyncio.all_tasks() - {asyncio.current_task()}:
+            for talk in self._talks:
+                talk.cancel()
+            # Not `close`, which waits until all that was written is read, and over TLS for the camera's farewell.
+            for transport in self._transports:
+                transport.abort()
+            await asyncio.wait(others)
         server.close()
-        talks = asyncio.all_tasks(self._loop)
-        for talk in talks:
-            talk.cancel()
-        self._loop.run_until_complete(asyncio.gather(*talks, return_exceptions=True))
-        self._loop.close()
+
+    def _accept(self, player: asyncio.StreamReader, to_player: asyncio.StreamWriter) -> None:
+        # No coroutine: one that is cancelled before its first step would leave the connection open.
+        self._transports.add(to_player.transport)
+        talk = asyncio.create_task(self._serve(player, to_player))
+        self._talks.add(talk)
+        talk.add_done_callback(self._talks.discard)
 
     async def _serve(self, player: asyncio.StreamReader, to_player: asyncio.StreamWriter) -> None:
         try:
@@ -95,22 +113,24 @@ class Relay:
             if not isinstance(first, Message) or self._here not in first.first:
                 return
             camera, to_camera = await connect(self._target, self._addresses)
+            self._transports.add(to_camera.transport)
             try:
                 talk = _Talk(self, to_camera, to_player)
                 await talk.ask(first)
                 both = [asyncio.ensure_future(talk.requests(player)), asyncio.ensure_future(talk.responses(camera))]
-                done, others = await asyncio.wait(both, return_when=asyncio.FIRST_COMPLETED)
-                for other in others:
-                    other.cancel()
-                for task in done:
-                    task.result()
+                try:
+                    await asyncio.wait(both, return_when=asyncio.FIRST_COMPLETED)
+                finally:
+                    for one in both:
+                        one.cancel()
+                    ends = await asyncio.gather(*both, return_exceptions=True)
+                for end in ends:
+                    if isinstance(end, Exception):
+                        raise end
             finally:
                 to_camera.close()
         except CameraError as error:
             self._why = str(error)
-        except asyncio.CancelledError:
-            # The relay ends, and this with it; asyncio would report a server's task that ends so.
-            pass
         except OSError as error:
             self._why = self._why or f"the connection broke off: {error.strerror or error}"
         finally:
