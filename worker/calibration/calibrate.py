@@ -22,12 +22,20 @@ from worker.calibration.gate.pairs import (
     refusal_by_pairs,
     stitch_error_px,
 )
-from worker.calibration.gate.quality import CameraResult, Gate, credible_deviations, in_one_sentence, ridge_rejection
+from worker.calibration.gate.quality import (
+    MUCH_UNEXPECTED,
+    CameraResult,
+    Gate,
+    credible_deviations,
+    in_one_sentence,
+    ridge_rejection,
+)
 from worker.calibration.geometry.camera import Camera, Frame
 from worker.calibration.geometry.field import Field
 from worker.calibration.memory.camera_memory import AcceptedJob, CameraMemory, fingerprint_of_frames, memories_of_field
 from worker.calibration.near_path import NearSolution, refine_by_lines
 from worker.calibration.observe import NOTHING_USUAL, FrameObserver
+from worker.calibration.paint_path import show_paint_of_field
 from worker.calibration.records import (
     NOT_RECORDED,
     Calibration,
@@ -95,6 +103,9 @@ def calibrate(
     # Solve and judge: where the cameras stood if all usable ones pass there, else by search and refinement.
     solved = _solve(problem, observer, progress)
 
+    # Among the lines of several sports, look for those of one paint.
+    solved, observer = _solve_in_paint(problem, solved, observer, progress)
+
     # Recover: search anywhere for cameras that do not stand where they stood.
     problem, solution, judged, path = _recover(solved, observer, progress)
     seen = [problem.observed.seen_by_network(n) for n in range(len(cameras))]
@@ -140,14 +151,24 @@ def _solve(problem: Problem, observer: FrameObserver, progress: ProgressReporter
     solved = _judged_together(problem, _near_solution(problem, near, progress), progress)
     if solved is not None:
         return problem, *solved, "near"
-    found_near = NO_CAMERAS if near is None else near.cameras
-    solved = _judged_together(problem, search_in_overviews(problem, progress, found_near), progress)
+    return _search_around(problem, observer, lost, NO_CAMERAS if near is None else near.cameras, progress)
+
+
+def _search_around(
+    problem: Problem,
+    observer: FrameObserver,
+    lost: Sequence[int],
+    near: Mapping[int, Camera],
+    progress: ProgressReporter,
+) -> Solved:
+    """Search around their stored poses for the cameras that are `lost`, with those that were found `near` theirs."""
+    solved = _judged_together(problem, search_in_overviews(problem, progress, near), progress)
     if solved is not None:
         return problem, *solved, "wide"
 
-    # Around it, by all that the network sees.
+    # By all that the network sees.
     problem = observer.look_in_full(problem, lost, progress)
-    solution = search_and_refine(problem, progress, found_near)
+    solution = search_and_refine(problem, progress, near)
     solution = refit_zoomed(problem, solution, progress)
     while True:
         judged = judge_together(problem, solution.pitch, solution.results, progress)
@@ -173,6 +194,22 @@ def _judged_together(
         return None
     judged = judge_together(problem, solution.pitch, solution.results, progress)
     return (solution, judged) if all(judged.cameras[n].accepted for n in solution.together) else None
+
+
+def _solve_in_paint(
+    problem: Problem, solved: Solved, observer: FrameObserver, progress: ProgressReporter
+) -> tuple[Solved, FrameObserver]:
+    """Return the solution of a problem with the frames that it explains: `solved` in all colours, or that in one paint
+    where the field's lines are told by it from others that are seen."""
+    _, _, judged, _ = solved
+    results = [judged.cameras[n] for n in problem.usable]
+    if not any(one.overlap.unexpected >= MUCH_UNEXPECTED for one in results):
+        return solved, observer
+    painted = show_paint_of_field(problem, observer, results, progress.muted())
+    if painted is None:
+        return solved, observer
+    problem = painted.with_overviews(painted.seen_in(problem), progress)
+    return _search_around(problem, painted, range(len(problem.cameras)), NO_CAMERAS, progress), painted
 
 
 def _recover(solved: Solved, observer: FrameObserver, progress: ProgressReporter) -> Solved:

@@ -16,11 +16,12 @@ import numpy as np
 from worker.calibration.detection.contrast import Channels
 from worker.calibration.detection.exclusions import of_use
 from worker.calibration.detection.frame_fusion import Sway, median, sways
-from worker.calibration.detection.segmentation import overview, reachable_regions, whole_frame
+from worker.calibration.detection.paint import draw_colours
+from worker.calibration.detection.segmentation import Region, overview, reachable_regions, whole_frame
 from worker.calibration.detection.view_condition import UsualView, ViewCondition, look_at
 from worker.calibration.diagnostics.registration import Response
 from worker.calibration.gate.quality import in_one_sentence
-from worker.calibration.geometry.camera import Camera, Frame
+from worker.calibration.geometry.camera import Array, Camera, Frame
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.visibility import VisibleLines
 from worker.calibration.records import CalibrationError, ProgressReporter, Segment
@@ -65,8 +66,25 @@ class FrameObserver:
                 for camera in self.cameras
                 for view in [view_of(self.frames[camera.id], self.pitch, camera, usual.get(camera.id))]
             ]
+        return self._unseen_by_network(views)
+
+    def _unseen_by_network(self, views: Sequence[ViewCondition]) -> ObservedCameras:
         channels = [Channels(self.frames[camera.id], self.swayed[camera.id]) for camera in self.cameras]
         return ObservedCameras(views, Observations.of_lines_alone(channels), [None] * len(channels), frozenset())
+
+    def seen_in(self, problem: Problem) -> Problem:
+        """Return a problem of the same views with these frames, before the network has looked at anything."""
+        return replace(problem, observed=self._unseen_by_network(problem.observed.views))
+
+    def regions_of_lines(self, number: int) -> list[Region]:
+        """Return where in the frames of a camera lines can be, as far as its pose may be off."""
+        camera = self.cameras[number]
+        return reachable_regions(self.pitch, camera, CAPTURE_RAD * camera.intrinsics.focal_length_px)
+
+    def in_colours(self, colours: Array, chosen: Sequence[int]) -> FrameObserver:
+        """Return the observer of the same frames in which only the chosen ones of the `colours` of lines show."""
+        drawn = {name: [draw_colours(frame, colours, chosen) for frame in its] for name, its in self.frames.items()}
+        return replace(self, frames=drawn)
 
     def with_overviews(self, problem: Problem, progress: ProgressReporter) -> Problem:
         """Return the problem with what the network sees in overviews of the first frames of all cameras.
@@ -92,7 +110,7 @@ class FrameObserver:
         with progress.timed("segmentation"):
             for n in numbers:
                 camera = self.cameras[n]
-                regions = reachable_regions(self.pitch, camera, CAPTURE_RAD * camera.intrinsics.focal_length_px)
+                regions = self.regions_of_lines(n)
                 seen = []
                 for frame in self.frames[camera.id]:
                     progress.at("segmentation", done / total)

@@ -89,8 +89,8 @@ class Relay:
         self._here = f"rtsp://127.0.0.1:{server.sockets[0].getsockname()[1]}/{self._token}"
         self._listening.set()
         await self._end.wait()
-        # A connection may be about to be accepted: its talk begins while the others end, and asyncio leaves it open where
-        # the server is closed by then.
+        # A connection may be about to be accepted: its talk begins while the others end. asyncio would leave it open if
+        # the server were closed by then.
         while others := asyncio.all_tasks() - {asyncio.current_task()}:
             for talk in self._talks:
                 talk.cancel()

@@ -1,0 +1,100 @@
+"""The paints on a floor: lines of several sports, each in a colour of its own.
+
+A pixel on the edge of a line is a mixture of ground and paint, (1 - a) G + a P. Beside the ground it lies on,
+pixel / G - 1 = a (P / G - 1) =: a D: the share `a` of a paint is linear in what is seen, and D is the same in light and
+in shade, and for cameras of different exposure. So a frame can be drawn as one in which one paint alone is bright.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from worker.calibration.detection.segmentation import Region
+from worker.calibration.geometry.camera import Array, Frame
+
+LOOKED_AT_WIDTH_PX = 640
+"""Width at which the ground is looked for: lines are thin there."""
+GROUND_PX = 21
+"""Side of the square whose median is the ground, px at that width: more than twice as wide as any line."""
+DARK = 4.0
+"""Added to all brightness, grey levels: what is black anyway has no colour."""
+LEAST_DIFFERENCE = 0.25
+"""How much a line differs from its ground, as a share of the ground's brightness, for its colour to be read off."""
+MOST_COLOURS = 8
+"""Into how many colours all that stands out is sorted. Halls have up to six paints; one that shines, or that another
+line touches, has two."""
+LEAST_PART = 0.03
+"""Of all that stands out from the ground, for a colour to be that of lines."""
+SPREAD_RAD = 0.2
+"""How far the colours of one paint are spread, as an angle between differences: white and yellow on blue are 0.26."""
+FAINTEST = 0.15
+"""The share of a paint below which a pixel shows none: noise, and edges of other lines."""
+GROUND_LEVEL, PAINT_LEVEL = 60.0, 140.0
+"""Grey levels of the ground, and by how much paint is brighter, where only some colours are drawn."""
+ROWS = 256
+"""Rows of a frame that are looked at at once: a frame of 4K would take 400 MB as numbers."""
+
+
+def sort_colours(frames: Sequence[Frame], regions: Sequence[Sequence[Region]]) -> Array:
+    """Return the colours of lines on the floor, (K, 3): differences to the ground in blue, green and red, as shares.
+
+    They are read off frames (H, W, 3) where `regions` of each can show lines.
+    """
+    seen = np.concatenate([_colours_of_lines(frame, its) for frame, its in zip(frames, regions, strict=True)])
+    if len(seen) < MOST_COLOURS:
+        return np.empty((0, 3))
+    hues = seen / np.linalg.norm(seen, axis=1, keepdims=True)
+    cv2.setRNGSeed(0)
+    criteria = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 50, 1e-4)
+    labels = cv2.kmeans(hues, MOST_COLOURS, np.empty(0), criteria, 3, cv2.KMEANS_PP_CENTERS)[1][:, 0]
+    groups = [seen[labels == label] for label in range(MOST_COLOURS)]
+    return np.array([np.median(group, axis=0) for group in groups if len(group) >= LEAST_PART * len(seen)])
+
+
+def draw_colours(frame: Frame, colours: Array, chosen: Sequence[int]) -> Frame:
+    """Return the frame (H, W, 3) in grey: the chosen ones of the `colours` (K, 3) of its lines are bright, and all else
+    is as dark as the ground."""
+    sizes = np.linalg.norm(colours, axis=1)
+    directions = (colours / sizes[:, None]).T.astype(np.float32)
+    drawn = np.empty_like(frame)
+    for rows, difference in _differences(frame):
+        along = difference @ directions
+        size = np.linalg.norm(difference, axis=-1, keepdims=True)
+        angle = np.arccos(np.clip(along / np.maximum(size, 1e-6), -1.0, 1.0))
+        likelihood = np.exp(-0.5 * (angle / SPREAD_RAD) ** 2)
+        # What is of none of the colours is of none of them, and not of the nearest.
+        belongs = likelihood / np.maximum(likelihood.sum(axis=-1, keepdims=True), np.exp(-0.5 * 2.0**2))
+        share = np.clip(along / sizes.astype(np.float32), 0.0, 1.0)
+        shown = (belongs * share)[..., list(chosen)].sum(axis=-1)
+        shown = np.clip((shown - FAINTEST) / (1 - FAINTEST), 0.0, 1.0)
+        drawn[rows] = (GROUND_LEVEL + PAINT_LEVEL * shown)[..., None]
+    return drawn
+
+
+def _colours_of_lines(frame: Frame, regions: Sequence[Region]) -> NDArray[np.float32]:
+    """Differences (N, 3) to the ground of pixels that differ more than their neighbours: the middles of lines."""
+    looked_at = np.zeros(frame.shape[:2], dtype=bool)
+    for region in regions:
+        looked_at[region.top : region.bottom, region.left : region.right] = True
+    colours = []
+    for rows, difference in _differences(frame):
+        size = np.linalg.norm(difference, axis=-1)
+        peak = size >= cv2.dilate(size, np.ones((3, 3), np.uint8))
+        colours.append(difference[peak & (size > LEAST_DIFFERENCE) & looked_at[rows]])
+    return np.concatenate(colours)
+
+
+def _differences(frame: Frame) -> Iterator[tuple[slice, NDArray[np.float32]]]:
+    """Yield rows of a frame, and how their pixels (h, W, 3) differ from the ground, as shares of its brightness."""
+    height, width = frame.shape[:2]
+    factor = max(1, round(width / LOOKED_AT_WIDTH_PX))
+    small = cv2.resize(frame, (width // factor, height // factor), interpolation=cv2.INTER_AREA)
+    ground = cv2.resize(cv2.medianBlur(small, GROUND_PX), (width, height), interpolation=cv2.INTER_LINEAR)
+    for top in range(0, height, ROWS):
+        rows = slice(top, min(top + ROWS, height))
+        pixels, there = (np.asarray(part[rows], dtype=np.float32) + np.float32(DARK) for part in (frame, ground))
+        yield rows, pixels / there - 1
