@@ -51,6 +51,7 @@ from worker.calibration.refinement.diagnosis import find_suspicions
 from worker.calibration.solve import (
     PoseSolution,
     Problem,
+    evidence_at,
     is_doubtful,
     loss_of,
     refine_without,
@@ -200,8 +201,11 @@ def _solve_in_paint(
     problem: Problem, solved: Solved, observer: FrameObserver, progress: ProgressReporter
 ) -> tuple[Solved, FrameObserver]:
     """Return the solution of a problem with the frames that it explains: `solved` in all colours, or that in one paint
-    where the field's lines are told by it from others that are seen."""
-    _, _, judged, _ = solved
+    where the field's lines are told by it from others that are seen.
+
+    In one paint less is seen of them. So the solution has to find more of them in all colours as well.
+    """
+    looked_at, _, judged, _ = solved
     results = [judged.cameras[n] for n in problem.usable]
     if not any(one.overlap.unexpected >= MUCH_UNEXPECTED for one in results):
         return solved, observer
@@ -209,7 +213,10 @@ def _solve_in_paint(
     if painted is None:
         return solved, observer
     problem = painted.with_overviews(painted.seen_in(problem), progress)
-    return _search_around(problem, painted, range(len(problem.cameras)), NO_CAMERAS, progress), painted
+    again = _search_around(problem, painted, range(len(problem.cameras)), NO_CAMERAS, progress)
+    found = [evidence_at(looked_at, n, again[2].cameras[n].camera).agreement for n in problem.usable]
+    is_better = sum(found) > sum(one.evidence.agreement for one in results)
+    return (again, painted) if is_better else (solved, observer)
 
 
 def _recover(solved: Solved, observer: FrameObserver, progress: ProgressReporter) -> Solved:

@@ -402,6 +402,13 @@ def follows_zoom(problem: Problem, result: CameraResult) -> bool:
     return problem.options.lens_may_drift and result.zoom is not None and is_sure(result.zoom)
 
 
+def evidence_at(problem: Problem, number: int, camera: Camera) -> Evidence:
+    """Return how much of the field's lines the frames of a camera show where it stands as `camera` does."""
+    observations = problem.observed.observations
+    seen = observations.channels[number], observations.responses[number]
+    return evidence_of(problem.pitch.line_points(), camera, *seen, left_out(problem.pitch, camera))
+
+
 def _evidence_at_stored(
     lines: LinePoints, pitch: Field, stored: Camera, channels: Channels, response: Response
 ) -> Evidence:

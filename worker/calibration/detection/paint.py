@@ -51,8 +51,17 @@ def sort_colours(frames: Sequence[Frame], regions: Sequence[Sequence[Region]]) -
     cv2.setRNGSeed(0)
     criteria = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 50, 1e-4)
     labels = cv2.kmeans(hues, MOST_COLOURS, np.empty(0), criteria, 3, cv2.KMEANS_PP_CENTERS)[1][:, 0]
-    groups = [seen[labels == label] for label in range(MOST_COLOURS)]
-    return np.array([np.median(group, axis=0) for group in groups if len(group) >= LEAST_PART * len(seen)])
+    colours: list[Array] = []
+    for group in sorted((seen[labels == label] for label in range(MOST_COLOURS)), key=len, reverse=True):
+        colour = np.median(group, axis=0)
+        # Clusters cut a paint in two where it is most of all that is seen.
+        if len(group) >= LEAST_PART * len(seen) and all(_angle(colour, other) > SPREAD_RAD for other in colours):
+            colours.append(colour)
+    return np.array(colours)
+
+
+def _angle(one: Array, other: Array) -> float:
+    return float(np.arccos(np.clip(one @ other / (np.linalg.norm(one) * np.linalg.norm(other)), -1.0, 1.0)))
 
 
 def draw_colours(frame: Frame, colours: Array, chosen: Sequence[int]) -> Frame:

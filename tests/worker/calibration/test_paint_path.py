@@ -1,0 +1,62 @@
+"""A hall whose floor has lines of three sports: those of the venue are told by their colour."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from fields.template import load
+from models import MODEL_PATH
+from tests.worker.calibration.synthetic import GRASS, PAINTS, camera, moved, paint_markings
+from worker.calibration import calibrate as engine
+from worker.calibration.calibrate import calibrate
+from worker.calibration.detection.segmentation import Segmenter
+from worker.calibration.gate.quality import Moved
+from worker.calibration.geometry.field import Field
+from worker.calibration.records import Options
+
+pytestmark = pytest.mark.slow
+
+NETBALL = Field(30.5, 15.25, 0.05, template=load("netball"))
+BASKETBALL = Field(28.0, 15.0, 0.05, template=load("basketball"))
+VOLLEYBALL = Field(18.0, 9.0, 0.05, template=load("volleyball"))
+COURTS = [(-10.0, -3.5), (-10.0, 3.5), (0.0, -3.5), (0.0, 3.5)]
+CAMERA = camera("hall", (-2.0, -9.5, 5.0), (-7.0, 0.0), focal=560.0)
+STORED = moved(CAMERA, (0.012, -0.01, 0.006), (0.05, -0.04, 0.06))
+
+
+@cache
+def frame():
+    """Red lines of netball, below blue ones of basketball and white ones of four small courts."""
+    picture = np.broadcast_to(GRASS, (*CAMERA.intrinsics.size[::-1], 3)).copy()
+    lines = [("red", NETBALL, (0.0, 0.0)), ("blue", BASKETBALL, (0.0, 0.0))]
+    for colour, field, (x, y) in [*lines, *(("white", VOLLEYBALL, middle) for middle in COURTS)]:
+        picture += paint_markings(field, moved(CAMERA, by=(-x, -y, 0.0)))[..., None] * (PAINTS[colour] - picture)
+    noisy = picture + np.random.default_rng(2).normal(scale=2.0, size=picture.shape)
+    return np.clip(noisy, 0, 255).astype(np.uint8)
+
+
+@cache
+def calibrated():
+    return calibrate(NETBALL, [STORED], {"hall": [frame()]}, Segmenter(MODEL_PATH, 1), Options()).cameras[0]
+
+
+def off_px(result):
+    return Moved.between(NETBALL, CAMERA, result.camera).pixels
+
+
+def test_a_camera_is_found_by_the_lines_of_its_own_sport():
+    assert calibrated().accepted, calibrated().rejected_because
+    assert off_px(calibrated()) < 0.5
+
+
+def test_the_lines_of_the_others_are_none_that_nobody_expects():
+    assert calibrated().overlap.unexpected < 0.2
+
+
+def test_without_their_colour_the_pose_is_drawn_to_lines_of_the_others(monkeypatch):
+    """This floor is as hard as it is meant to be."""
+    monkeypatch.setattr(engine, "show_paint_of_field", lambda *_: None)
+    options = Options(recover="never")
+    result = calibrate(NETBALL, [STORED], {"hall": [frame()]}, Segmenter(MODEL_PATH, 1), options).cameras[0]
+    assert off_px(result) > 1.5
