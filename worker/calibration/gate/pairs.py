@@ -11,6 +11,7 @@ from worker.calibration.detection.evidence import Evidence
 from worker.calibration.detection.line_measurement import Measurements
 from worker.calibration.diagnostics.line_registration import MeasuredLines, register_lines
 from worker.calibration.diagnostics.registration import (
+    PIXEL_M,
     Registration,
     Response,
     pair_error_px,
@@ -47,7 +48,8 @@ class Pair:
 
     `error_px`: how far apart they put them, 1 px = 10 cm; None where their views cannot be brought together, and then
     there is no `registration`. `plenty`: they share so much that this tells something; `confirmed`: they
-    register, or both see what they share where their poses put it.
+    register, or both see what they share where their poses put it. `shift_px`: what is so far apart, as pixels of the
+    frame that shows it larger.
     """
 
     first: str
@@ -56,6 +58,7 @@ class Pair:
     plenty: bool
     confirmed: bool
     registration: Registration | None = None
+    shift_px: float = np.inf
 
     @property
     def cameras(self) -> tuple[str, str]:
@@ -63,8 +66,12 @@ class Pair:
         return self.first, self.second
 
     def agrees(self, gate: Gate) -> bool:
-        """Whether they confirm each other."""
-        return self.error_px is not None and self.error_px <= gate.largest_stitch_error_px
+        """Whether they confirm each other.
+
+        Where far grass moves by less than a pixel of either frame, neither tells its place any better.
+        """
+        is_near = self.error_px is not None and self.error_px <= gate.largest_stitch_error_px
+        return is_near or self.shift_px <= gate.largest_ground_sigma_px
 
     @property
     def missed(self) -> bool:
@@ -73,7 +80,7 @@ class Pair:
 
     def disagrees(self, gate: Gate) -> bool:
         """Whether they contradict each other. Two that share too little to be compared do neither."""
-        return self.missed or (self.error_px is not None and self.error_px > gate.largest_stitch_error_px)
+        return self.missed or (self.error_px is not None and not self.agrees(gate))
 
     def words(self, gate: Gate) -> str:
         """What contradicts what, and what to do."""
@@ -84,7 +91,8 @@ class Pair:
             )
         return (
             f"the cameras {both} do not fit each other: stitch error {self.error_px:.2f} px, at most "
-            f"{gate.largest_stitch_error_px} allowed; look at the preview, and check intrinsics and ridge"
+            f"{gate.largest_stitch_error_px} allowed, which is {self.shift_px:.1f} px of a frame, at most "
+            f"{gate.largest_ground_sigma_px} allowed; look at the preview, and check intrinsics and ridge"
         )
 
 
@@ -110,8 +118,18 @@ def compare_pairs(pitch: Field, cameras: Sequence[CameraResponse]) -> list[Pair]
         registered = _register(pitch, first, second)
         error_px = None if registered is None else registered.error_px
         confirmed = registered is not None or _both_see(first.evidence(), second.evidence())
-        found.append(Pair(pair[0].id, pair[1].id, error_px, shares_plenty(pitch, *pair), confirmed, registered))
+        plenty, shift_px = shares_plenty(pitch, *pair), _shift_px(pitch, registered, pair)
+        found.append(Pair(pair[0].id, pair[1].id, error_px, plenty, confirmed, registered, shift_px))
     return found
+
+
+def _shift_px(pitch: Field, registered: Registration | None, cameras: Sequence[Camera]) -> float:
+    """Return how far apart a pair puts the same place, in pixels of the frame that shows it larger; inf if unknown."""
+    if registered is None:
+        return np.inf
+    apart = PIXEL_M * np.array([registered.dx_px, registered.dy_px])
+    places = pitch.lift(np.array([registered.at, registered.at + apart]))
+    return float(max(np.linalg.norm(np.diff(camera.project(places), axis=0)) for camera in cameras))
 
 
 def _register(pitch: Field, first: CameraResponse, second: CameraResponse) -> Registration | None:
@@ -139,9 +157,13 @@ def measured_by_lines(pitch: Field, pairs: Sequence[Pair], cameras: Sequence[Cam
     by_id = {one.camera.id: one for one in cameras}
     found = []
     for pair in pairs:
-        lines = _register_lines(pitch, by_id[pair.first], by_id[pair.second]) if pair.agrees(gate) else None
-        finer = pair if lines is None else replace(pair, error_px=lines.error_px, registration=lines)
-        found.append(finer if finer.agrees(gate) else pair)
+        both = [by_id[camera] for camera in pair.cameras]
+        lines = _register_lines(pitch, *both) if pair.agrees(gate) else None
+        if lines is not None:
+            shift_px = _shift_px(pitch, lines, [one.camera for one in both])
+            finer = replace(pair, error_px=lines.error_px, registration=lines, shift_px=shift_px)
+            pair = finer if finer.agrees(gate) else pair
+        found.append(pair)
     return found
 
 

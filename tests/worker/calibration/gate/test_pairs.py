@@ -35,6 +35,23 @@ def test_cameras_that_agree_are_not_to_blame_for_anything() -> None:
     assert blamed(pair("ab", 0.2), pair("bc", 1.4)) == set()
 
 
+def test_two_that_are_less_than_a_pixel_of_their_frames_apart_agree_however_much_grass_that_is() -> None:
+    assert Pair("a", "b", 4.0, plenty=True, confirmed=True, shift_px=0.9).agrees(GATE)
+    beyond = Pair("a", "b", 4.0, plenty=True, confirmed=True, shift_px=1.2)
+    assert beyond.disagrees(GATE)
+    assert "stitch error 4.00 px, at most 1.5 allowed, which is 1.2 px of a frame" in beyond.words(GATE)
+
+
+def test_a_pair_says_by_how_many_pixels_of_a_frame_it_is_apart() -> None:
+    """Two cameras 40 m from the middle, one of which is turned by half a degree: about five pixels of 600 px a radian."""
+    one, other = synthetic.pair(())
+    turned = moved(other, rotation=(0.0, 0.0, np.radians(0.5)))
+    responses = [paint_markings(PITCH, camera) for camera in (one, other)]
+    (apart,) = compare_pairs(PITCH, [seeing(one, responses[0]), seeing(turned, responses[1])])
+    assert apart.shift_px == pytest.approx(np.radians(0.5) * 600, rel=0.35)
+    assert not apart.agrees(GATE)
+
+
 @pytest.mark.parametrize("error_px", [4.0, None])
 def test_two_that_contradict_each_other_are_both_to_blame(error_px: float | None) -> None:
     assert blamed(pair("ab", error_px)) == {"a", "b"}
