@@ -26,6 +26,7 @@ MOVED_M, MOVED_DEG = 0.16, 1.0
 LARGEST_BYTES = 3_000_000
 # What a good board leaves, which a lens without a sigma is taken to be as sure as.
 LENS_SIGMA = {"fx": 0.7, "fy": 0.7, "cx": 1.0, "cy": 1.0, "k1": 0.0005, "k2": 0.0005}
+FIELD_SIGMA = {"length_m": 0.03, "width_m": 0.02}
 
 FIELD = Field(105.0, 68.0, 0.12, np.array([[-18.5, 0.0, 0.35], [18.5, 0.0, 0.35]]))
 
@@ -84,7 +85,7 @@ def main() -> None:
     venue = {
         "id": "demo",
         "name": "Demo pitch (rendered)",
-        "field": {"template": "football", **shape, "ridge": FIELD.ridge.tolist()},
+        "field": {"template": "football", **shape, "ridge": FIELD.ridge.tolist(), "sigma": FIELD_SIGMA},
         "cameras": entries,
     }
     (HERE / "venue.json").write_text(json.dumps(venue, indent=1) + "\n")

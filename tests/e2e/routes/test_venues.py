@@ -4,6 +4,8 @@ import pytest
 
 from tests.e2e.running import venue
 
+MEASURED = {"length_m": 0.03, "width_m": 0.02}
+
 
 def test_a_new_venue_is_created_and_an_old_one_replaced(service, name):
     first = service.http.put(f"/venues/{name}", json=venue(name))
@@ -44,6 +46,7 @@ def kept(answer):
 
 def test_a_lens_of_which_nobody_says_how_well_it_is_known_is_said_to_be_taken_for_well_known(service, name):
     document = venue(name)
+    document["field"]["sigma"] = MEASURED
     document["cameras"][0]["intrinsics"]["sigma"] = {"fx": 0.5}
     (warning,) = service.http.put(f"/venues/{name}", json=document).json()["warnings"]
     assert warning == (
@@ -55,8 +58,22 @@ def test_a_lens_of_which_nobody_says_how_well_it_is_known_is_said_to_be_taken_fo
     assert "warnings" not in service.http.get(f"/venues/{name}").json()
 
 
+def test_a_field_of_the_usual_size_that_nobody_vouches_for_is_said_to_be_taken_for_measured(service, name):
+    document = venue(name, cameras=("left",))
+    document["cameras"][0]["intrinsics"]["sigma"] = {"fx": 0.5}
+    (warning,) = service.http.put(f"/venues/{name}", json=document).json()["warnings"]
+    assert warning == (
+        "field: length_m 105 and width_m 68, as is usual for football, are taken for measured, to 0.03 %: if nobody has "
+        'measured this one, say so by sigma {"length_m": 1, "width_m": 1}, or how well somebody has'
+    )
+    (of_width,) = patched(service, name, {"field": {"length_m": 104.2}}).json()["warnings"]
+    assert of_width.startswith("field: width_m 68, as")
+    assert patched(service, name, {"field": {"sigma": {"width_m": 1}}}).json()["warnings"] == []
+
+
 def test_a_pose_in_another_convention_is_named_by_put_and_by_patch(service, name):
     document = venue(name, cameras=("left",))
+    document["field"]["sigma"] = MEASURED
     document["cameras"][0]["intrinsics"]["sigma"] = {"fx": 0.5}
     assert service.http.put(f"/venues/{name}", json=document).json()["warnings"] == []
     pose = document["cameras"][0]["pose"]
