@@ -22,14 +22,14 @@ from worker.calibration.diagnostics.overlap import overlap_of
 from worker.calibration.diagnostics.registration import Response
 from worker.calibration.gate.quality import MUCH_UNEXPECTED, CameraResult, Gate, Moved, alone_rejection
 from worker.calibration.geometry.camera import Camera
-from worker.calibration.geometry.field import Field, LinePoints
+from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.parameters import Parameter, free_focal_lengths, free_ridge
 from worker.calibration.geometry.visibility import VisibleLines
 from worker.calibration.memory.camera_memory import CameraMemory
 from worker.calibration.records import NOT_RECORDED, Options, ProgressReporter, Recorder
 from worker.calibration.refinement.diagnosis import is_sure
 from worker.calibration.refinement.refine import SEARCH_PX, LineReader, Observations, evaluate_poses, refine
-from worker.calibration.refinement.uncertainty import Deviation, RefinedPoses
+from worker.calibration.refinement.uncertainty import Deviation, RefinedPose, RefinedPoses
 from worker.calibration.search.genome import genome_of
 from worker.calibration.search.objective import Objective
 from worker.calibration.search.search import COARSE_TO_FINE, Found, Strategy, search
@@ -71,6 +71,10 @@ class ObservedCameras:
             [self.overviews[n] for n in numbers],
             [at for at, n in enumerate(numbers) if n in self.in_full],
         )
+
+    def seen(self, number: int) -> tuple[Channels, Response]:
+        """Return the channels of the frames of a camera, and the network's response (H, W) to them."""
+        return self.observations.channels[number], self.observations.responses[number]
 
     def seen_by_network(self, number: int) -> Response:
         """Return the network's response (h, w) to the frame of a camera, or else to its overview."""
@@ -333,44 +337,24 @@ def free_parameters(problem: Problem) -> list[Parameter]:
 
 def judge_each(problem: Problem, refined: RefinedPoses, progress: ProgressReporter) -> list[CameraResult]:
     """Judge each refined camera by itself beside its stored pose, on the pitch that it was refined with."""
-    pitch, observations = problem.pitch, problem.observed.observations
     with progress.timed("quality"):
-        lines = pitch.line_points()
-        results = [
-            CameraResult(
-                camera=after.camera,
-                evidence=after.evidence,
-                residual_px=after.residual_px,
-                covariance=after.covariance,
-                repeatability=after.repeatability,
-                zoom=after.zoom,
-                with_fitted_zoom=after.with_fitted_zoom,
-                ground_sigma=after.ground_sigma,
-                refined=after.refined,
-                lens_change=after.lens_change,
-                cross_checked=after.cross_checked,
-                measured=after.measured,
-                repainted_markings=after.repainted_markings,
-                uneven_m=after.uneven_m,
-                view=view,
-                overlap=overlap_of(refined.pitch, after.camera.resized(seen.shape[1]), seen),
-                evidence_before=cache(partial(_evidence_at_stored, lines, pitch, before, channels, response)),
-                moved=Moved.between(pitch, before, after.camera),
-                markings=report_markings(refined.pitch, after, channels, response),
-                moved_in_all=None if memory is None else Moved.between(pitch, memory.origin, after.camera),
-            )
-            for before, memory, after, view, channels, response, seen in zip(
-                problem.cameras,
-                problem.memories,
-                refined.each,
-                problem.observed.views,
-                observations.channels,
-                observations.responses,
-                map(problem.observed.seen_by_network, range(len(problem.cameras))),
-                strict=True,
-            )
-        ]
-        return [replace(result, refusal=alone_rejection(result, problem.gate)) for result in results]
+        return [_judge(problem, number, refined.pitch, after) for number, after in enumerate(refined.each)]
+
+
+def _judge(problem: Problem, number: int, pitch: Field, after: RefinedPose) -> CameraResult:
+    stored, memory = problem.cameras[number], problem.memories[number]
+    channels, response = problem.observed.seen(number)
+    seen = problem.observed.seen_by_network(number)
+    result = CameraResult(
+        **vars(after),
+        view=problem.observed.views[number],
+        overlap=overlap_of(pitch, after.camera.resized(seen.shape[1]), seen),
+        evidence_before=cache(partial(evidence_at, problem, number, stored)),
+        moved=Moved.between(problem.pitch, stored, after.camera),
+        markings=report_markings(pitch, after, channels, response),
+        moved_in_all=None if memory is None else Moved.between(problem.pitch, memory.origin, after.camera),
+    )
+    return replace(result, refusal=alone_rejection(result, problem.gate))
 
 
 def shows_most_lines(pitch: Field, cameras: Sequence[Camera], reader: LineReader) -> list[bool]:
@@ -404,15 +388,8 @@ def follows_zoom(problem: Problem, result: CameraResult) -> bool:
 
 def evidence_at(problem: Problem, number: int, camera: Camera) -> Evidence:
     """Return how much of the field's lines the frames of a camera show where it stands as `camera` does."""
-    observations = problem.observed.observations
-    seen = observations.channels[number], observations.responses[number]
-    return evidence_of(problem.pitch.line_points(), camera, *seen, left_out(problem.pitch, camera))
-
-
-def _evidence_at_stored(
-    lines: LinePoints, pitch: Field, stored: Camera, channels: Channels, response: Response
-) -> Evidence:
-    return evidence_of(lines, stored, channels, response, left_out(pitch, stored))
+    pitch = problem.pitch
+    return evidence_of(pitch.line_points(), camera, *problem.observed.seen(number), left_out(pitch, camera))
 
 
 def loss_of(problem: Problem, pitch: Field, answered: Sequence[Camera]) -> float:
