@@ -11,6 +11,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
+import cv2
 import numpy as np
 
 from worker.calibration.detection.contrast import Channels
@@ -80,6 +81,16 @@ class FrameObserver:
         """Return where in the frames of a camera lines can be, as far as its pose may be off."""
         camera = self.cameras[number]
         return reachable_regions(self.pitch, camera, CAPTURE_RAD * camera.intrinsics.focal_length_px)
+
+    def reduced(self, width: int) -> FrameObserver:
+        """Return the observer of the first frame of each camera, at most so wide."""
+        cameras = [camera.resized(min(width, camera.intrinsics.size[0])) for camera in self.cameras]
+        frames = {}
+        for camera in cameras:
+            first = self.frames[camera.id][0]
+            small = cv2.resize(first, camera.intrinsics.size, interpolation=cv2.INTER_AREA)
+            frames[camera.id] = [np.asarray(small, dtype=np.uint8)]
+        return FrameObserver.of(self.pitch, cameras, frames, self.segment)
 
     def in_colours(self, colours: Array, chosen: Sequence[int]) -> FrameObserver:
         """Return the observer of the same frames in which only the chosen ones of the `colours` of lines show."""

@@ -10,37 +10,41 @@ colour does about as well with other poses, the frames do not tell, and the fiel
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from worker.calibration.detection.paint import sort_colours
-from worker.calibration.diagnostics.overlap import overlap_of
+from worker.calibration.diagnostics.overlap import Overlap, overlap_of
 from worker.calibration.gate.quality import MUCH_UNEXPECTED, CameraResult
+from worker.calibration.geometry.camera import Camera
 from worker.calibration.observe import FrameObserver
 from worker.calibration.records import ProgressReporter
-from worker.calibration.refinement.refine import Observations
-from worker.calibration.solve import Problem, judge_each, network_responses, refine_poses, search_poses
+from worker.calibration.solve import Problem, network_responses, search_poses
+
+COMPARED_WIDTH_PX = 1280
+"""Width of the frames in which colours are compared. Lines are wide enough to show their paint, and which is the
+field's is seen in overviews."""
 
 
 @dataclass(frozen=True)
 class _Explanation:
-    """Where a search in overviews finds the cameras, in frames that show some colours only: `problem` and `results`."""
+    """Where a search in overviews finds the `cameras`, in frames that show some colours only."""
 
     problem: Problem
-    results: Sequence[CameraResult]
+    cameras: Sequence[Camera]
 
-    @property
+    @cached_property
     def iou(self) -> float:
         """Mean overlap 0..1 of the lines of the field and those that are seen."""
-        return _mean([one.overlap.iou for one in self.results])
+        return _mean([one.iou for one in self.overlaps_at(self.cameras)])
 
-    def unexpected_at(self, results: Sequence[CameraResult]) -> float:
-        """Return the share 0..1 of the lines on the field that is seen beside all of its own, from other poses."""
-        seen = map(self.problem.observed.seen_by_network, range(len(results)))
-        cameras = [one.camera for one in results]
+    def overlaps_at(self, cameras: Sequence[Camera]) -> list[Overlap]:
+        """Return how the lines that are seen cover those of the field, from other poses."""
+        seen = map(self.problem.observed.seen_by_network, range(len(cameras)))
         pairs = zip(cameras, seen, strict=True)
-        return _mean([overlap_of(self.problem.pitch, one.resized(its.shape[1]), its).unexpected for one, its in pairs])
+        return [overlap_of(self.problem.pitch, one.resized(its.shape[1]), its) for one, its in pairs]
 
 
 def show_paint_of_field(
@@ -51,13 +55,16 @@ def show_paint_of_field(
     None where no paint explains more of the lines than all colours together did (`results` of the usable cameras), or
     two do so equally well.
     """
-    first = [observer.frames[problem.cameras[n].id][0] for n in problem.usable]
-    colours = sort_colours(first, [observer.regions_of_lines(n) for n in problem.usable])
-    explained = [_search_in(observer.in_colours(colours, [n]), problem, progress) for n in range(len(colours))]
+    small = observer.reduced(COMPARED_WIDTH_PX)
+    first = [small.frames[small.cameras[n].id][0] for n in problem.usable]
+    colours = sort_colours(first, [small.regions_of_lines(n) for n in problem.usable])
+    reduced = replace(problem, cameras=small.cameras)
+    explained = [_search_in(small.in_colours(colours, [n]), reduced, progress) for n in range(len(colours))]
     best = max(explained, key=lambda one: one.iou, default=None)
     if best is None or best.iou <= _mean([one.overlap.iou for one in results]):
         return None
-    chosen = [n for n, one in enumerate(explained) if one.unexpected_at(best.results) < MUCH_UNEXPECTED]
+    beside = [_mean([its.unexpected for its in one.overlaps_at(best.cameras)]) for one in explained]
+    chosen = [n for n, share in enumerate(beside) if share < MUCH_UNEXPECTED]
     others = [one for n, one in enumerate(explained) if n not in chosen]
     if any(one.iou > best.iou - problem.gate.agreement_loss for one in others):
         return None
@@ -67,10 +74,7 @@ def show_paint_of_field(
 def _search_in(observer: FrameObserver, problem: Problem, progress: ProgressReporter) -> _Explanation:
     problem = observer.with_overviews(observer.seen_in(problem), progress)
     group = problem.of(problem.usable)
-    found = search_poses(group, network_responses(group), progress)
-    by_lines = Observations.of_lines_alone(group.observed.observations.channels)
-    refined = refine_poses(group, found.cameras, by_lines, progress)
-    return _Explanation(group, judge_each(group, refined, progress))
+    return _Explanation(group, search_poses(group, network_responses(group), progress).cameras)
 
 
 def _mean(values: Sequence[float]) -> float:
