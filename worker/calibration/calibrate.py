@@ -35,7 +35,7 @@ from worker.calibration.geometry.field import Field
 from worker.calibration.memory.camera_memory import AcceptedJob, CameraMemory, fingerprint_of_frames, memories_of_field
 from worker.calibration.near_path import NearSolution, refine_by_lines
 from worker.calibration.observe import NOTHING_USUAL, FrameObserver
-from worker.calibration.paint_path import show_paint_of_field
+from worker.calibration.paint_path import log_odds, show_paint_of_field
 from worker.calibration.records import (
     NOT_RECORDED,
     Calibration,
@@ -203,20 +203,23 @@ def _solve_in_paint(
     """Return the solution of a problem with the frames that it explains: `solved` in all colours, or that in one paint
     where the field's lines are told by it from others that are seen.
 
-    In one paint less is seen of them. So the solution has to find more of them in all colours as well.
+    In one paint less is seen of them. So the solution has to be the likelier one in all colours as well.
     """
     looked_at, _, judged, _ = solved
-    results = [judged.cameras[n] for n in problem.usable]
-    if not any(one.overlap.unexpected >= MUCH_UNEXPECTED for one in results):
+    usable = problem.usable
+    if not any(judged.cameras[n].overlap.unexpected >= MUCH_UNEXPECTED for n in usable):
         return solved, observer
-    painted = show_paint_of_field(problem, observer, results, progress.muted())
+    painted = show_paint_of_field(problem, observer, progress.muted())
     if painted is None:
         return solved, observer
-    problem = painted.with_overviews(painted.seen_in(problem), progress)
-    again = _search_around(problem, painted, range(len(problem.cameras)), NO_CAMERAS, progress)
-    found = [evidence_at(looked_at, n, again[2].cameras[n].camera).agreement for n in problem.usable]
-    is_better = sum(found) > sum(one.evidence.agreement for one in results)
-    return (again, painted) if is_better else (solved, observer)
+    seen = painted.with_overviews(painted.seen_in(problem), progress)
+    again = _search_around(seen, painted, range(len(problem.cameras)), NO_CAMERAS, progress)
+    odds = []
+    for _, _, result, _ in (solved, again):
+        found = [result.cameras[n].camera for n in usable]
+        shares = [evidence_at(looked_at, n, camera).agreement for n, camera in zip(usable, found, strict=True)]
+        odds.append(log_odds(problem.of(usable), found, shares))
+    return (again, painted) if odds[1] > odds[0] else (solved, observer)
 
 
 def _recover(solved: Solved, observer: FrameObserver, progress: ProgressReporter) -> Solved:

@@ -2,9 +2,10 @@
 
 Which paint is the field's is one unknown that all its lines and all cameras share. Where most of what looks like a
 line on the field is none of its lines, each colour on the floor is taken for the field's, and the cameras are searched
-for in frames that show no other. The field has the colour that covers its lines best and lies nowhere else, and with it
-all colours most of which lie on its lines then: paint in light and in shade, or beside another line. Where another
-colour does about as well with other poses, the frames do not tell, and the field is looked for in all colours.
+for in frames that show no other. The field has the colour that most likely shows its lines: it covers them and lies
+nowhere else, from where the cameras may be. With it go all colours most of which lie on its lines then: paint in light
+and in shade, or beside another line. Where another colour is about as likely with other poses, the frames do not tell,
+and the field is looked for in all colours.
 """
 
 from __future__ import annotations
@@ -17,15 +18,25 @@ import numpy as np
 
 from worker.calibration.detection.paint import sort_colours
 from worker.calibration.diagnostics.overlap import Overlap, overlap_of
-from worker.calibration.gate.quality import MUCH_UNEXPECTED, CameraResult
+from worker.calibration.gate.quality import MUCH_UNEXPECTED
 from worker.calibration.geometry.camera import Camera
+from worker.calibration.geometry.derivatives import POSE_NUMBERS
+from worker.calibration.geometry.rotation import rotation_angles_deg
+from worker.calibration.geometry.visibility import VisibleLines
 from worker.calibration.observe import FrameObserver
 from worker.calibration.records import ProgressReporter
+from worker.calibration.refinement.priors import MOVED_M, MOVED_RAD
 from worker.calibration.solve import Problem, network_responses, search_poses
 
 COMPARED_WIDTH_PX = 1280
 """Width of the frames in which colours are compared. Lines are wide enough to show their paint, and which is the
 field's is seen in overviews."""
+PIECE_M = 10.0
+"""Length of line that says one thing: neighbours on it are seen, or not, together."""
+LEAST_SHARE = 0.01
+"""Of lines something else always hides, and something else always fits: no camera alone is surer than that."""
+SURE_NATS = float(np.log(1000))
+"""By how much the odds of a colour have to be better than those of any other."""
 
 
 @dataclass(frozen=True)
@@ -36,9 +47,9 @@ class _Explanation:
     cameras: Sequence[Camera]
 
     @cached_property
-    def iou(self) -> float:
-        """Mean overlap 0..1 of the lines of the field and those that are seen."""
-        return _mean([one.iou for one in self.overlaps_at(self.cameras)])
+    def log_odds(self) -> float:
+        """How much likelier it is than what chance finds, nats (see `log_odds`)."""
+        return log_odds(self.problem, self.cameras, [one.iou for one in self.overlaps_at(self.cameras)])
 
     def overlaps_at(self, cameras: Sequence[Camera]) -> list[Overlap]:
         """Return how the lines that are seen cover those of the field, from other poses."""
@@ -47,26 +58,39 @@ class _Explanation:
         return [overlap_of(self.problem.pitch, one.resized(its.shape[1]), its) for one, its in pairs]
 
 
-def show_paint_of_field(
-    problem: Problem, observer: FrameObserver, results: Sequence[CameraResult], progress: ProgressReporter
-) -> FrameObserver | None:
-    """Return the frames in which only the paint of the field's lines shows.
+def log_odds(problem: Problem, found: Sequence[Camera], shares: Sequence[float]) -> float:
+    """Return how much likelier `found` poses are than ones that chance finds, in nats.
 
-    None where no paint explains more of the lines than all colours together did (`results` of the usable cameras), or
-    two do so equally well.
+    By the `shares` 0..1 of lines that fit there, a piece of ten metres being one witness (see `information`), and by
+    how far the cameras would have moved, where a move of any size is expected in proportion to it (see `priors`).
     """
+    lines = problem.pitch.line_points()
+    total = 0.0
+    for stored, camera, share in zip(problem.cameras, found, shares, strict=True):
+        pieces = len(VisibleLines.from_camera(lines, camera)) * lines.spacing / PIECE_M
+        fitting = float(np.clip(share, LEAST_SHARE, 1 - LEAST_SHARE))
+        turned_rad = np.radians(float(rotation_angles_deg(stored.pose.rotation, camera.pose.rotation)))
+        moved_m = float(np.linalg.norm(camera.pose.position - stored.pose.position))
+        scale = max(turned_rad / MOVED_RAD, moved_m / MOVED_M, 1.0)
+        total += pieces * np.log(fitting / (1 - fitting)) - POSE_NUMBERS * np.log(scale)
+    return total
+
+
+def show_paint_of_field(problem: Problem, observer: FrameObserver, progress: ProgressReporter) -> FrameObserver | None:
+    """Return the frames in which only the paint of the field's lines shows; None where no paint is likelier than all
+    others."""
     small = observer.reduced(COMPARED_WIDTH_PX)
     first = [small.frames[small.cameras[n].id][0] for n in problem.usable]
     colours = sort_colours(first, [small.regions_of_lines(n) for n in problem.usable])
     reduced = replace(problem, cameras=small.cameras)
     explained = [_search_in(small.in_colours(colours, [n]), reduced, progress) for n in range(len(colours))]
-    best = max(explained, key=lambda one: one.iou, default=None)
-    if best is None or best.iou <= _mean([one.overlap.iou for one in results]):
+    best = max(explained, key=lambda one: one.log_odds, default=None)
+    if best is None:
         return None
-    beside = [_mean([its.unexpected for its in one.overlaps_at(best.cameras)]) for one in explained]
-    chosen = [n for n, share in enumerate(beside) if share < MUCH_UNEXPECTED]
+    beside = [np.mean([its.unexpected for its in one.overlaps_at(best.cameras)]) for one in explained]
+    chosen = [n for n, share in enumerate(beside) if share < MUCH_UNEXPECTED or explained[n] is best]
     others = [one for n, one in enumerate(explained) if n not in chosen]
-    if any(one.iou > best.iou - problem.gate.agreement_loss for one in others):
+    if any(one.log_odds > best.log_odds - SURE_NATS for one in others):
         return None
     return observer.in_colours(colours, chosen)
 
@@ -75,7 +99,3 @@ def _search_in(observer: FrameObserver, problem: Problem, progress: ProgressRepo
     problem = observer.with_overviews(observer.seen_in(problem), progress)
     group = problem.of(problem.usable)
     return _Explanation(group, search_poses(group, network_responses(group), progress).cameras)
-
-
-def _mean(values: Sequence[float]) -> float:
-    return float(np.mean(values))
