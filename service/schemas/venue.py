@@ -319,8 +319,9 @@ class ChangedVenue(Venue):
     warnings: list[str] = Field(
         [],
         description="Of poses from which no field is filmed, with the convention that would explain them, and of "
-        "lenses: those without a `sigma`, without rays for a part of the picture, of another resolution, and of a field "
-        "of its sport's usual size without a `sigma`. Not kept: GET does not show it, and PUT takes it and ignores it.",
+        "lenses: those without a `sigma`, without rays for a part of the picture, of another resolution; and of a "
+        "field of its sport's usual size without a `sigma`. Not kept: GET does not show it, and PUT takes it and "
+        "ignores it.",
         examples=[
             [
                 "camera west: its lens has no sigma and is taken to be as sure as a good board leaves it, "

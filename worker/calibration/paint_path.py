@@ -61,8 +61,8 @@ class _Explanation:
 def log_odds(problem: Problem, found: Sequence[Camera], shares: Sequence[float]) -> float:
     """Return how much likelier `found` poses are than ones that chance finds, in nats.
 
-    By the `shares` 0..1 of lines that fit there, a piece of ten metres being one witness (see `information`), and by
-    how far the cameras would have moved, where a move of any size is expected in proportion to it (see `priors`).
+    By the `shares` 0..1 of lines that fit there, of which ten metres are one witness, as they are of sigma, and by how
+    far the cameras would have moved, the scale of which may be any (see `priors`).
     """
     lines = problem.pitch.line_points()
     total = 0.0

@@ -13,7 +13,9 @@ from worker.calibration.calibrate import calibrate
 from worker.calibration.detection.segmentation import Segmenter
 from worker.calibration.gate.quality import Moved
 from worker.calibration.geometry.field import Field
+from worker.calibration.paint_path import log_odds
 from worker.calibration.records import Options
+from worker.calibration.solve import Problem
 
 pytestmark = pytest.mark.slow
 
@@ -52,6 +54,19 @@ def test_a_camera_is_found_by_the_lines_of_its_own_sport():
 
 def test_the_lines_of_the_others_are_none_that_nobody_expects():
     assert calibrated().overlap.unexpected < 0.2
+
+
+def test_a_pose_loses_by_how_far_its_camera_would_have_moved_what_it_gains_by_lines_that_fit():
+    problem = Problem(NETBALL, [CAMERA], None, Options(), [None])
+    far = moved(CAMERA, by=(1.0, 0.0, 0.0))
+
+    def odds(camera, share):
+        return log_odds(problem, [camera], [share])
+
+    assert odds(CAMERA, 0.5) == pytest.approx(0.0)
+    assert odds(far, 0.5) == pytest.approx(-6 * np.log(10.0))
+    assert odds(far, 0.5) < odds(CAMERA, 0.45) < odds(far, 0.95) < odds(CAMERA, 0.95)
+    assert odds(CAMERA, 1.0) == odds(CAMERA, 0.99)
 
 
 def test_without_their_colour_the_pose_is_drawn_to_lines_of_the_others(monkeypatch):

@@ -43,7 +43,7 @@ def test_two_that_are_less_than_a_pixel_of_their_frames_apart_agree_however_much
 
 
 def test_a_pair_says_by_how_many_pixels_of_a_frame_it_is_apart() -> None:
-    """Two cameras 40 m from the middle, one of which is turned by half a degree: about five pixels of 600 px a radian."""
+    """Two cameras 40 m from the middle, one of which is turned by half a degree: about five pixels."""
     one, other = synthetic.pair(())
     turned = moved(other, rotation=(0.0, 0.0, np.radians(0.5)))
     responses = [paint_markings(PITCH, camera) for camera in (one, other)]
