@@ -203,23 +203,30 @@ def _solve_in_paint(
     """Return the solution of a problem with the frames that it explains: `solved` in all colours, or that in one paint
     where the field's lines are told by it from others that are seen.
 
-    In one paint less is seen of them. So the solution has to be the likelier one in all colours as well.
+    Its cameras share a floor: lines of another sport are in view of all of them, where one that was turned is alone. In
+    one paint less is seen of the field's lines. So the solution has to be the likelier one in all colours as well.
     """
-    looked_at, _, judged, _ = solved
+    judged = solved[2]
     usable = problem.usable
-    if not any(judged.cameras[n].overlap.unexpected >= MUCH_UNEXPECTED for n in usable):
+    if not usable or any(judged.cameras[n].overlap.unexpected < MUCH_UNEXPECTED for n in usable):
         return solved, observer
     painted = show_paint_of_field(problem, observer, progress.muted())
     if painted is None:
         return solved, observer
     seen = painted.with_overviews(painted.seen_in(problem), progress)
     again = _search_around(seen, painted, range(len(problem.cameras)), NO_CAMERAS, progress)
-    odds = []
-    for _, _, result, _ in (solved, again):
-        found = [result.cameras[n].camera for n in usable]
-        shares = [evidence_at(looked_at, n, camera).agreement for n, camera in zip(usable, found, strict=True)]
-        odds.append(log_odds(problem.of(usable), found, shares))
-    return (again, painted) if odds[1] > odds[0] else (solved, observer)
+    # What passes neither way is looked for elsewhere, by all that is seen.
+    passes = any(one.accepted for one in [*judged.cameras, *again[2].cameras])
+    is_better = passes and _log_odds(solved[0], again[2]) > _log_odds(solved[0], judged)
+    return (again, painted) if is_better else (solved, observer)
+
+
+def _log_odds(problem: Problem, judged: EngineResult) -> float:
+    """Return how much likelier judged poses are than ones that chance finds, by the frames of a problem, in nats."""
+    usable = problem.usable
+    found = [judged.cameras[n].camera for n in usable]
+    shares = [evidence_at(problem, n, camera).agreement for n, camera in zip(usable, found, strict=True)]
+    return log_odds(problem.of(usable), found, shares)
 
 
 def _recover(solved: Solved, observer: FrameObserver, progress: ProgressReporter) -> Solved:
