@@ -44,18 +44,17 @@ def unseen_damages(whole, kind, count):
 @pytest.mark.parametrize("kind", DAMAGES)
 def test_a_jpeg_that_is_damaged_in_its_scan_is_not_decoded(kind):
     whole = cv2.imencode(".jpg", SCENE, [cv2.IMWRITE_JPEG_QUALITY, 90])[1].tobytes()
-    # Exchanged pieces may leave as many blocks as there were, which libjpeg has no warning for.
-    assert unseen_damages(whole, kind, 10) <= (1 if kind == "exchanged" else 0)
+    assert unseen_damages(whole, kind, 10) == 0
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("quality", [80, 95])
 @pytest.mark.parametrize("kind", DAMAGES)
-def test_hardly_one_in_a_hundred_damages_of_a_frame_of_4k_is_not_seen(kind, quality):
+def test_one_of_eight_hundred_damages_of_a_frame_of_4k_is_not_seen(kind, quality):
     frame = cv2.imread("tests/demo/left.jpg")
     whole = cv2.imencode(".jpg", frame, [cv2.IMWRITE_JPEG_QUALITY, quality])[1].tobytes()
-    # Zeros and exchanged pieces may leave as many blocks as there were, with a step that other damages hide.
-    assert unseen_damages(whole, kind, 100) <= {"exchanged": 2, "zeroed": 1}.get(kind, 0)
+    # Zeros that left as many blocks as there were, and a step straight across the picture: so do bars of a broadcast.
+    assert unseen_damages(whole, kind, 100) == ((kind, quality) == ("zeroed", 80))
 
 
 @pytest.mark.long
