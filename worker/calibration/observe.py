@@ -93,9 +93,12 @@ class FrameObserver:
         return FrameObserver.of(self.pitch, cameras, frames, self.segment)
 
     def in_colours(self, colours: Array, chosen: Sequence[int]) -> FrameObserver:
-        """Return the observer of the same frames in which only the chosen ones of the `colours` of lines show."""
-        drawn = {name: [draw_colours(frame, colours, chosen) for frame in its] for name, its in self.frames.items()}
-        return replace(self, frames=drawn)
+        """Return the observer of the first frames, in which only the chosen ones of the `colours` of lines show.
+
+        All frames of a job may fill half of its memory.
+        """
+        drawn = {name: [draw_colours(its[0], colours, chosen)] for name, its in self.frames.items()}
+        return FrameObserver.of(self.pitch, self.cameras, drawn, self.segment)
 
     def with_overviews(self, problem: Problem, progress: ProgressReporter) -> Problem:
         """Return the problem with what the network sees in overviews of the first frames of all cameras.
