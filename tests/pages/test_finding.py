@@ -107,6 +107,8 @@ def test_where_several_poses_explain_a_frame_a_person_chooses_by_a_click(stub, v
     stub.end(page.url.rpartition("/")[2])
     # The stub of a calibration moves the one that it accepts an eighth of the way nearer.
     assert [depth(stub.http.get(f"/venues/{name}").json(), camera) for camera in ("left", "right")] == [35, 60]
+    # The page loads itself again at the end of its job, and would break off what is opened just then.
+    expect(page.get_by_text("Accepted").first).to_be_visible()
     page.goto(f"/ui/jobs/{job['id']}")
     expect(page.get_by_text("Taken, as revision 1 of")).to_be_visible()
     expect(button).to_have_count(0)
