@@ -286,7 +286,7 @@ class FieldOfPlay(Schema):
 
     @property
     def warnings(self) -> list[str]:
-        """What is assumed of a length and a width that are the usual ones of the sport and that nobody vouches for."""
+        """A warning where length or width is the usual one of the sport and nobody says how well it is known."""
         if not isinstance(self.template, str) or not self.is_known:
             return []
         usual = load(self.template).size

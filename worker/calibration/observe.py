@@ -77,9 +77,8 @@ class FrameObserver:
         """Return a problem of the same views with these frames, before the network has looked at anything."""
         return replace(problem, observed=self._unseen_by_network(problem.observed.views))
 
-    def regions_of_lines(self, number: int) -> list[Region]:
-        """Return where in the frames of a camera lines can be, as far as its pose may be off."""
-        camera = self.cameras[number]
+    def regions_of_lines(self, camera: Camera) -> list[Region]:
+        """Return where in the frames of a camera, or in reduced ones, lines can be, as far as its pose may be off."""
         return reachable_regions(self.pitch, camera, CAPTURE_RAD * camera.intrinsics.focal_length_px)
 
     def reduced(self, width: int) -> FrameObserver:
@@ -110,8 +109,7 @@ class FrameObserver:
             for n in [n for n in range(len(self.cameras)) if n not in problem.observed.in_full]:
                 frame = overview(self.frames[self.cameras[n].id][0])
                 camera = self.cameras[n].resized(frame.shape[1])
-                regions = reachable_regions(self.pitch, camera, CAPTURE_RAD * camera.intrinsics.focal_length_px)
-                response = self.segment(frame, regions).astype(np.float32)
+                response = self.segment(frame, self.regions_of_lines(camera)).astype(np.float32)
                 overviews[n] = of_use(camera.ignored, response / np.float32(255))
         return replace(problem, observed=replace(problem.observed, overviews=overviews))
 
@@ -124,7 +122,7 @@ class FrameObserver:
         with progress.timed("segmentation"):
             for n in numbers:
                 camera = self.cameras[n]
-                regions = self.regions_of_lines(n)
+                regions = self.regions_of_lines(camera)
                 seen = []
                 for frame in self.frames[camera.id]:
                     progress.at("segmentation", done / total)

@@ -18,23 +18,21 @@ import numpy as np
 
 from worker.calibration.detection.paint import sort_colours
 from worker.calibration.diagnostics.overlap import Overlap, overlap_of
-from worker.calibration.gate.quality import MUCH_UNEXPECTED
+from worker.calibration.gate.quality import MUCH_UNEXPECTED, Moved
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.derivatives import POSE_NUMBERS
-from worker.calibration.geometry.rotation import rotation_angles_deg
 from worker.calibration.geometry.visibility import VisibleLines
 from worker.calibration.observe import FrameObserver
 from worker.calibration.records import ProgressReporter
+from worker.calibration.refinement.least_squares import CLUSTER_POINTS
 from worker.calibration.refinement.priors import MOVED_M, MOVED_RAD
 from worker.calibration.solve import Problem, network_responses, search_poses
 
 COMPARED_WIDTH_PX = 1280
 """Width of the frames in which colours are compared. Lines are wide enough to show their paint, and which is the
 field's is seen in overviews."""
-PIECE_M = 10.0
-"""Length of line that says one thing: neighbours on it are seen, or not, together."""
 LEAST_SHARE = 0.01
-"""Of lines something else always hides, and something else always fits: no camera alone is surer than that."""
+"""The share of lines that something else always hides, or fits: no camera alone is surer than that."""
 SURE_NATS = float(np.log(1000))
 """By how much the odds of a colour have to be better than those of any other."""
 
@@ -48,7 +46,7 @@ class _Explanation:
 
     @cached_property
     def log_odds(self) -> float:
-        """How much likelier it is than what chance finds, nats (see `log_odds`)."""
+        """The log odds (nats) of these poses against ones that chance finds, see `log_odds`."""
         return log_odds(self.problem, self.cameras, [one.iou for one in self.overlaps_at(self.cameras)])
 
     def overlaps_at(self, cameras: Sequence[Camera]) -> list[Overlap]:
@@ -67,11 +65,10 @@ def log_odds(problem: Problem, found: Sequence[Camera], shares: Sequence[float])
     lines = problem.pitch.line_points()
     total = 0.0
     for stored, camera, share in zip(problem.cameras, found, shares, strict=True):
-        pieces = len(VisibleLines.from_camera(lines, camera)) * lines.spacing / PIECE_M
+        pieces = len(VisibleLines.from_camera(lines, camera)) / CLUSTER_POINTS
         fitting = float(np.clip(share, LEAST_SHARE, 1 - LEAST_SHARE))
-        turned_rad = np.radians(float(rotation_angles_deg(stored.pose.rotation, camera.pose.rotation)))
-        moved_m = float(np.linalg.norm(camera.pose.position - stored.pose.position))
-        scale = max(turned_rad / MOVED_RAD, moved_m / MOVED_M, 1.0)
+        moved = Moved.between(problem.pitch, stored, camera)
+        scale = max(np.radians(moved.rotation_deg) / MOVED_RAD, moved.position_m / MOVED_M, 1.0)
         total += pieces * np.log(fitting / (1 - fitting)) - POSE_NUMBERS * np.log(scale)
     return total
 
@@ -81,7 +78,7 @@ def show_paint_of_field(problem: Problem, observer: FrameObserver, progress: Pro
     others."""
     small = observer.reduced(COMPARED_WIDTH_PX)
     first = [small.frames[small.cameras[n].id][0] for n in problem.usable]
-    colours = sort_colours(first, [small.regions_of_lines(n) for n in problem.usable])
+    colours = sort_colours(first, [small.regions_of_lines(small.cameras[n]) for n in problem.usable])
     reduced = replace(problem, cameras=small.cameras)
     explained = [_search_in(small.in_colours(colours, [n]), reduced, progress) for n in range(len(colours))]
     best = max(explained, key=lambda one: one.log_odds, default=None)

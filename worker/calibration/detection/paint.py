@@ -23,14 +23,14 @@ GROUND_PX = 21
 DARK = 4.0
 """Added to all brightness, grey levels: what is black anyway has no colour."""
 LEAST_DIFFERENCE = 0.25
-"""How much a line differs from its ground, as a share of the ground's brightness, for its colour to be read off."""
+"""The least difference of a line from its ground, as a share of the ground's brightness, whose colour is read off."""
 MOST_COLOURS = 8
 """Into how many colours all that stands out is sorted. Halls have up to six paints; one that shines, or that another
 line touches, has two."""
 LEAST_PART = 0.03
-"""Of all that stands out from the ground, for a colour to be that of lines."""
+"""The least part of all that stands out from the ground which a paint of lines has."""
 SPREAD_RAD = 0.2
-"""How far the colours of one paint are spread, as an angle between differences: white and yellow on blue are 0.26."""
+"""Spread of the colours of one paint, as an angle between differences: white and yellow on blue are 0.26 apart."""
 FAINTEST = 0.15
 """The share of a paint below which a pixel shows none: noise, and edges of other lines."""
 GROUND_LEVEL, PAINT_LEVEL = 60.0, 140.0

@@ -66,7 +66,7 @@ class Pair:
         return self.first, self.second
 
     def agrees(self, gate: Gate) -> bool:
-        """Whether they confirm each other.
+        """Return whether the two cameras confirm each other.
 
         Where far grass moves by less than a pixel of either frame, neither tells its place any better.
         """
