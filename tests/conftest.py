@@ -41,7 +41,7 @@ PARTS = {
     "firefox": "install Firefox (Debian: apt-get install firefox-esr)",
     "nginx": "install nginx (Debian: apt-get install nginx)",
     "caddy": "install Caddy (Debian: apt-get install caddy)",
-    "released": "fetch the whole history, which release 0.1.0 is built from (git fetch --unshallow)",
+    "released": "fetch the whole history, which the last release is built from (git fetch --unshallow)",
     "gstreamer": "install GStreamer's RTSP server (Debian: apt-get install python3-gi gir1.2-gst-rtsp-server-1.0 "
     "gstreamer1.0-plugins-good gstreamer1.0-plugins-bad)",
     "ffmpeg": "install FFmpeg (Debian: apt-get install ffmpeg)",

@@ -21,12 +21,12 @@ from alembic.migration import MigrationContext
 from alembic.script import ScriptDirectory
 from sqlalchemy.dialects.sqlite.base import SQLiteCompiler
 
+from service.store import tables
 from service.store.file_systems import network_file_system
 
 MIGRATIONS = Path(__file__).parent / "migrations"
-# Which schema a database has. Before the first release its name was that of Alembic's default, and the numbers of the
-# schemas in it were those that releases count by now.
-SCHEMA_TABLE, UNRELEASED_SCHEMA_TABLE = "esc_schema", "alembic_version"
+# Which schema a database has.
+SCHEMA_TABLE = "esc_schema"
 WRITES = "esc_writes"
 # How a transaction that reads is to see one state; every transaction of SQLite does.
 SNAPSHOT: dict[str, dict[str, Any]] = {"sqlite": {}, "postgresql": {"isolation_level": "REPEATABLE READ"}}
@@ -224,7 +224,7 @@ class Repository:
 def migrate(engine: sa.Engine) -> None:
     """Bring the schema up to date; of several processes that start together one does it.
 
-    Raises `UnsupportedDatabase` for one that a newer program made, or one from before the first release.
+    Raises `UnsupportedDatabase` for a database of a newer version, of one before 0.2.0, or of another program.
     """
     with writing(without_timeouts(engine)) as connection:
         advisory_lock(connection, "schema")
@@ -232,34 +232,45 @@ def migrate(engine: sa.Engine) -> None:
 
 
 def upgrade(connection: sa.Connection) -> None:
-    """Bring the schema up to date, inside the caller's transaction that is serialised about it."""
+    """Bring the schema up to date, inside the caller's transaction that is serialised about it.
+
+    An empty database gets the tables of today; those of an earlier version become them by migrations.
+    """
     config = Config()
     config.set_main_option("script_location", str(MIGRATIONS))
     config.attributes["connection"] = connection
-    _require_a_known_schema(connection, ScriptDirectory.from_config(config))
-    command.upgrade(config, "head")
+    found = schema_of(connection)
+    _require_supported_schema(connection, found)
+    if found is None:
+        tables.metadata.create_all(connection, checkfirst=False)
+        command.stamp(config, "head")
+    else:
+        command.upgrade(config, "head")
 
 
 def schema_of(connection: sa.Connection) -> str | None:
-    """The schema that a database has; None: none of a service."""
+    """Return the schema that a database has, or None if it has none of a service."""
     return MigrationContext.configure(connection, opts={"version_table": SCHEMA_TABLE}).get_current_revision()
 
 
 def newest_schema() -> str | None:
-    """The schema of this program."""
+    """Return the schema of this program."""
     return ScriptDirectory(str(MIGRATIONS)).get_current_head()
 
 
-def _require_a_known_schema(connection: sa.Connection, known: ScriptDirectory) -> None:
-    found = schema_of(connection)
-    program, newest = f"ESC {version('esc-calibration')}", known.get_current_head()
-    if found is None and {UNRELEASED_SCHEMA_TABLE, "jobs"} <= {*sa.inspect(connection).get_table_names()}:
+def _require_supported_schema(connection: sa.Connection, found: str | None) -> None:
+    known = [script.revision for script in ScriptDirectory(str(MIGRATIONS)).walk_revisions()]
+    newest, oldest = known[0], known[-1]
+    program = f"ESC {version('esc-calibration')}"
+    foreign = tables.metadata.tables.keys() & {*sa.inspect(connection).get_table_names()} if found is None else ()
+    if foreign or (found is not None and found < oldest):
+        made_by = f"schema {found}" if found else f"no schema number, but tables such as {min(foreign)}"
         raise UnsupportedDatabase(
-            "This database was made by a development version from before the first release, which cannot be brought up "
-            f"to date: {program} begins with schema {newest} on an empty one. Set ESC_DATA, or ESC_DATABASE_URL, to a "
-            "new place and PUT the venues there as the old version gives them (GET /venues)."
+            f"This database has {made_by}: a version before 0.2.0, or another program, made it. {program} takes an "
+            f"empty database or one of ESC 0.2.0 or later (schema {oldest} to {newest}). Set ESC_DATA, or "
+            "ESC_DATABASE_URL, to a new place and PUT the venues there as the old version gives them (GET /venues)."
         )
-    if found not in (None, *(script.revision for script in known.walk_revisions())):
+    if found not in (None, *known):
         raise UnsupportedDatabase(
             f"This database has schema {found}, and {program} knows none after {newest}: a newer version has been at "
             "it. Start that version again, or restore the backup from before the upgrade; there is no way back."

@@ -1,4 +1,4 @@
-"""The tables. What they mean is written here once; how they came to be is in `migrations`."""
+"""The tables, and what their columns mean. Those of an earlier version become these by `migrations`."""
 
 from __future__ import annotations
 
@@ -25,9 +25,8 @@ venues = sa.Table(
     "venues",
     metadata,
     sa.Column("id", sa.String(64), primary_key=True),
-    # schemas.venue.Venue, with the poses that hold now; both columns are told of in documents.py.
+    # schemas.venue.Venue, with the poses that hold now.
     sa.Column("document", sa.JSON, nullable=False),
-    sa.Column("additions", sa.JSON(none_as_null=True)),
     sa.Column("updated_at", Instant, nullable=False),
 )
 
@@ -53,7 +52,7 @@ revisions = sa.Table(
     sa.Column("field_numbers", sa.JSON(none_as_null=True)),
     # schemas.geometry.Movement by camera.
     sa.Column("movements", sa.JSON, nullable=False),
-    # Who made it, see actors.py; null: the service by itself, or before 0.2.0.
+    # Who made it, see actors.py; null: the service by itself.
     sa.Column("asked_by", sa.String(80)),
     sa.Column("address", sa.String(64)),
     sa.Column("request_id", sa.String(64)),
@@ -94,7 +93,6 @@ jobs = sa.Table(
     sa.Column("idempotency_key", sa.String(255)),
     # The venue as it was when the frames were checked against it; JSON's null where there is none.
     sa.Column("venue_document", sa.JSON, nullable=False),
-    sa.Column("venue_additions", sa.JSON(none_as_null=True)),
     # schemas.find.SoughtSite: a venue that is not stored yet, whose cameras are to be found.
     sa.Column("site", sa.JSON(none_as_null=True)),
     # Camera id (of photos: their names) to the paths of its frames in the blob store.
@@ -106,7 +104,6 @@ jobs = sa.Table(
     sa.Column("revision", sa.Integer, nullable=False, default=1),
     sa.Column("progress", sa.JSON(none_as_null=True)),
     sa.Column("result", sa.JSON(none_as_null=True)),
-    sa.Column("result_additions", sa.JSON(none_as_null=True)),
     # Names of the pictures that were made: not every pose can be drawn.
     sa.Column("pictures", sa.JSON(none_as_null=True)),
     sa.Column("error", sa.JSON(none_as_null=True)),
@@ -119,7 +116,7 @@ jobs = sa.Table(
     sa.Column("pictures_deleted_at", Instant),
     # schemas.job.Job's.
     sa.Column("asked_by", sa.String(80)),
-    # The client's; null: there was none, or it came before 0.2.0.
+    # The client's; null: there was none.
     sa.Column("address", sa.String(64)),
     # The request that it came with, as its log and its trace call it.
     sa.Column("request_id", sa.String(64)),
@@ -179,7 +176,7 @@ events = sa.Table(
     # Its data; of a job that ended, which is read when it is told, null.
     sa.Column("data", sa.JSON(none_as_null=True)),
     sa.Column("job", sa.String(26)),
-    # Who made it, see actors.py; null: the service by itself, or before 0.2.0.
+    # Who made it, see actors.py; null: the service by itself.
     sa.Column("asked_by", sa.String(80)),
     sa.Column("address", sa.String(64)),
     sa.Column("request_id", sa.String(64)),
@@ -372,13 +369,13 @@ workers = sa.Table(
     sa.Column("name", sa.String(255), primary_key=True),
     # Of the model file the worker computes with; null: the file is missing.
     sa.Column("model_sha256", sa.String(64)),
-    # Of the program; null: 0.1.0, which does not say.
+    # Of the program.
     sa.Column("version", sa.String(64)),
     # Jobs that wait and that it cannot read, because a newer version wrote them.
     sa.Column("unreadable_jobs", sa.Integer),
     sa.Column("started_at", Instant, nullable=False),
     sa.Column("seen_at", Instant, nullable=False),
-    # One for each start, by which two workers of one name are told apart; null: of a release that had none.
+    # One for each start, by which two workers of one name are told apart.
     sa.Column("token", sa.String(32)),
     # The folder and the start of the machine where only one worker of a name can run, hashed; null: it has ended.
     sa.Column("place", sa.String(64)),

@@ -12,7 +12,6 @@ import sqlalchemy as sa
 from pydantic import ValidationError
 
 from service.schemas.actor import Actor
-from service.schemas.addresses import HIDDEN
 from service.schemas.base import TOLERANTLY, Unreadable
 from service.schemas.field import FieldOfPlay
 from service.schemas.findings import describe_errors
@@ -20,12 +19,11 @@ from service.schemas.health import VenueHealth
 from service.schemas.history import Cause, Revision
 from service.schemas.names import OPEN_STATUSES
 from service.schemas.results import Result
-from service.schemas.source_urls import SourceSecrets, secrets_of
 from service.schemas.venue import Venue, VenueIn
 from service.store import live_alarms, tables
 from service.store.alarms import health_of, update_alarms
 from service.store.database import Repository, advisory_lock, clock, reading, writing
-from service.store.documents import Document, stored_venue, venue_columns, with_unknown_fields_of
+from service.store.documents import Document, stored_venue, to_document, with_unknown_fields_of
 from service.store.events.event_log import add_venue_event
 from service.store.memories import (
     Memories,
@@ -120,7 +118,7 @@ class VenueRepository(Repository):
         `q`: those whose id or name contains it; large letters are small ones (on SQLite those of ASCII). `state`: those
         of which an alarm rings, or none does.
         """
-        query = sa.select(v.id, v.document, v.additions).order_by(v.id).limit(limit + 1)
+        query = sa.select(v.id, v.document).order_by(v.id).limit(limit + 1)
         if after is not None:
             query = query.where(v.id > after)
         if only is not None:
@@ -170,7 +168,7 @@ class VenueRepository(Repository):
             advisory_lock(connection, venue_lock(venue_id))
             stored = (find or find_stored)(connection, venue_id)
             before = None if stored is None else stored.venue
-            venue, credentials = change(before, _credentials(connection, venue_id, stored))
+            venue, credentials = change(before, _credentials(connection, venue_id))
             _keep(connection, venue_id, credentials)
             store_venue(connection, stored, venue, "put", by)
             return venue, before is None
@@ -257,7 +255,7 @@ class VenueRepository(Repository):
         """
         with reading(self._engine) as connection:
             stored = find_stored(connection, venue_id)
-            return None if stored is None else (stored.venue, _credentials(connection, venue_id, stored))
+            return None if stored is None else (stored.venue, _credentials(connection, venue_id))
 
     def readable(self, venue_id: str) -> Venue | None:
         """Return one venue; None: there is none, or it cannot be read."""
@@ -305,7 +303,7 @@ def find_replaceable(connection: sa.Connection, venue_id: str) -> StoredVenue | 
     except UnreadableRow as error:
         for document in documents_as_of_revisions(connection, venue_id, row.document):
             with suppress(ValueError):
-                return StoredVenue(stored_venue(document, row.additions), document, error.why)
+                return StoredVenue(stored_venue(document), document, error.why)
         bare = Venue(id=venue_id, field=FieldOfPlay.model_validate({}), cameras=[])
         return StoredVenue(bare, {"cameras": []}, error.why)
 
@@ -319,12 +317,12 @@ def find_readable(connection: sa.Connection, venue_id: str) -> Venue | None:
 
 
 def _row_of(connection: sa.Connection, venue_id: str) -> Any:
-    return connection.execute(sa.select(v.id, v.document, v.additions).where(v.id == venue_id)).one_or_none()
+    return connection.execute(sa.select(v.id, v.document).where(v.id == venue_id)).one_or_none()
 
 
 def _venue_in(row: Any) -> Venue:
     with reading_row("venue", row.id):
-        return stored_venue(row.document, row.additions)
+        return stored_venue(row.document)
 
 
 @contextmanager
@@ -377,13 +375,12 @@ def save_venue(connection: sa.Connection, venue: Venue, now: datetime, before: S
         faults = [fault for fault in faults if fault not in known]
     if faults:
         raise VenueRefused("; ".join(faults[:MOST_FAULTS]))
-    document, additions = venue_columns(venue)
-    values = {"additions": additions, "updated_at": now}
+    document = to_document(venue)
     if before is None:
-        connection.execute(sa.insert(tables.venues).values(id=venue.id, document=document, **values))
+        connection.execute(sa.insert(tables.venues).values(id=venue.id, document=document, updated_at=now))
     else:
         whole = with_unknown_fields_of(before.document, document)
-        connection.execute(sa.update(tables.venues).where(v.id == venue.id).values(document=whole, **values))
+        connection.execute(sa.update(tables.venues).where(v.id == venue.id).values(document=whole, updated_at=now))
 
 
 def store_venue(
@@ -509,16 +506,9 @@ def restore_state(
     return then, forgetful
 
 
-def _credentials(connection: sa.Connection, venue_id: str, stored: StoredVenue | None) -> dict[str, str]:
+def _credentials(connection: sa.Connection, venue_id: str) -> dict[str, str]:
     rows = connection.execute(sa.select(tables.credentials).where(tables.credentials.c.venue == venue_id))
-    known = {row.camera: row.userinfo for row in rows}
-    # What was put by 0.1.0 has the parameters of its sources in the venue itself.
-    for camera in stored.document["cameras"] if stored else ():
-        there = secrets_of(camera.get("source") or "")
-        if any(value != HIDDEN for _, value in there.parameters):
-            userinfo = SourceSecrets.decoded(known.get(camera["id"], "")).userinfo
-            known[camera["id"]] = SourceSecrets(userinfo, there.parameters).encoded()
-    return known
+    return {row.camera: row.userinfo for row in rows}
 
 
 def _keep(connection: sa.Connection, venue_id: str, credentials: dict[str, str]) -> None:

@@ -22,8 +22,8 @@ w = workers.c
 class WorkerHeartbeat:
     """A worker, the seconds since its last sign of life, and the hash of its model file (None: missing).
 
-    `silent_s` is None while nobody knows: the clock was put back behind its last sign of life. `version` is None of
-    0.1.0, which does not say. `unreadable_jobs` wait for a worker of a newer version.
+    `silent_s` is None while nobody knows: the clock was put back behind its last sign of life. `unreadable_jobs` wait
+    for a worker of a newer version.
     """
 
     name: str
@@ -45,7 +45,7 @@ class WorkerHeartbeat:
 class WorkerStart:
     """The start of a worker that its row is of, and its last sign of life.
 
-    `place` is where no other worker of its name can run beside it; None: it has ended, or is of a release without.
+    `place` is where no other worker of its name can run beside it; None: it has ended.
     """
 
     token: str | None

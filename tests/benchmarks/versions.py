@@ -1,4 +1,4 @@
-"""`make bench-versions`: a hundred jobs in each pairing of release 0.1.0 and this version, in both homes.
+"""`make bench-versions`: a hundred jobs in each pairing of the last release and this version, in both homes.
 
 The stand-in for the engine computes them; each is to end as it should, and to move its venue once.
 """
@@ -14,14 +14,14 @@ from pathlib import Path
 from tests.benchmarks.service.stage import homes
 from tests.e2e.running import Service, wait_for
 from tests.homes import Home, environment
-from tests.released import Release, is_in_git, worker_beside
+from tests.released import Release, release_commit, worker_beside
 
-OLD, NEW = "0.1.0", "this"
+OLD, NEW = "old", "new"
 # The APIs that take the jobs, in turn, and the workers that compute them. Old processes begin before the schema is new.
 PAIRINGS: dict[str, tuple[Sequence[str], Sequence[str]]] = {
-    "API 0.1.0, workers 0.1.0": ([OLD], [OLD, OLD]),
-    "API of both, workers 0.1.0": ([OLD, NEW], [OLD, OLD]),
-    "API 0.1.0, workers of today": ([OLD], [NEW, NEW]),
+    "API of the release, workers of the release": ([OLD], [OLD, OLD]),
+    "API of both, workers of the release": ([OLD, NEW], [OLD, OLD]),
+    "API of the release, workers of today": ([OLD], [NEW, NEW]),
     "API of both, workers of both": ([OLD, NEW], [OLD, NEW]),
 }
 UPGRADE = "upgrade, one worker after the other"
@@ -31,12 +31,13 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--jobs", type=int, default=100)
     jobs = parser.parse_args().jobs
-    if not is_in_git():
-        print("Release 0.1.0 is built from git: fetch the whole history (git fetch --unshallow).", file=sys.stderr)
+    commit = release_commit()
+    if commit is None:
+        print("The release is built from git: fetch the whole history (git fetch --unshallow).", file=sys.stderr)
         return 2
     wrong = 0
     with tempfile.TemporaryDirectory(prefix="esc-versions-") as name, homes() as both:
-        release = Release(Path(name) / "release")
+        release = Release(Path(name) / "release", commit)
         print("| home | pairing | jobs | succeeded | at the first attempt | moved their venue once |")
         print("|---|---|---|---|---|---|")
         for number, (title, home) in enumerate(both.items()):

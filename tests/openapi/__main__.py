@@ -28,12 +28,17 @@ def main() -> int:
         kept = json.dumps(without_words(now), indent=1, sort_keys=True)
         (HERE / f"{version}.json").write_text(f"{kept}\n")
         return 0
-    last = max(HERE.glob("*.json"), key=lambda file: [int(number) for number in file.stem.split(".")])
+    last = last_document()
     found = findings(json.loads(last.read_text()), now)
     for finding in found:
         print(finding, file=sys.stderr)
     print(f"{len(found)} removals or tightenings since {last.stem}, see docs/compatibility.md")
     return bool(found)
+
+
+def last_document() -> Path:
+    """Return the file with the OpenAPI document of the last release."""
+    return max(HERE.glob("*.json"), key=lambda file: [int(number) for number in file.stem.split(".")])
 
 
 def document() -> dict[str, Any]:

@@ -2,14 +2,13 @@
 
 import copy
 import json
-from pathlib import Path
 
 import pytest
 
-from tests.openapi.__main__ import document, without_words
+from tests.openapi.__main__ import document, last_document, without_words
 from tests.openapi.comparing import findings
 
-RELEASED = json.loads((Path(__file__).parent / "0.1.0.json").read_text())
+RELEASED = json.loads(last_document().read_text())
 SCHEMAS = ("components", "schemas")
 VENUE_IN, VENUE, OPTIONS = ((*SCHEMAS, name) for name in ("VenueIn", "Venue", "Options"))
 ONE = ("paths", "/venues/{venue_id}")

@@ -1,21 +1,22 @@
-"""Release 0.1.0 for the tests, and fleets in which it and this version are mixed."""
+"""The last release for the tests, and fleets in which it and this version are mixed."""
 
 import pytest
 
 from tests.e2e.conftest import services_of_ones_own
-from tests.released import Release, is_in_git, worker_beside
+from tests.released import Release, release_commit, worker_beside
 
 
 @pytest.fixture(scope="session")
 def release(missing, tmp_path_factory):
-    if not is_in_git():
+    commit = release_commit()
+    if commit is None:
         missing("released")
-    return Release(tmp_path_factory.mktemp("released"))
+    return Release(tmp_path_factory.mktemp("released"), commit)
 
 
 @pytest.fixture
 def start(home, tmp_path):
-    """Start services of one's own in one home, whose tables the first of them makes: 0.1.0 reads no newer ones."""
+    """Start services in one home, whose tables the first of them makes: the last release reads no newer ones."""
     with services_of_ones_own(home, tmp_path / "esc", lambda folder: None) as start:
         yield start
 

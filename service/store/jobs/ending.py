@@ -20,7 +20,7 @@ from service.schemas.options import Options
 from service.schemas.results import AnyResult
 from service.store import tables
 from service.store.database import clock
-from service.store.documents import result_columns, to_document
+from service.store.documents import to_document
 from service.store.events.event_log import add_job_event
 from service.store.events.outbox import add_delivery
 from service.store.jobs.task import stored_options
@@ -53,7 +53,7 @@ def end_job(
     """
     now = clock(connection) if quality is None else quality.now
     if result is not None:
-        values["result"], values["result_additions"] = result_columns(result)
+        values["result"] = to_document(result)
     if error is not None:
         values["error"] = to_document(error)
     # Of the venue only what is needed of it here.

@@ -19,7 +19,7 @@ from service.schemas.results import NO_CHOICE, FindResult, Result
 from service.schemas.venue import Venue
 from service.store import tables
 from service.store.database import Repository, reading
-from service.store.documents import join_additions, stored_result, stored_venue
+from service.store.documents import stored_result, stored_venue
 from service.store.events.outbox import deliveries_of
 from service.store.jobs.files import picture_address, picture_file, picture_folder
 from service.store.jobs.task import Origin
@@ -219,12 +219,12 @@ def jobs_of(connection: sa.Connection, job_ids: Collection[str]) -> dict[str, Jo
 def found_poses(connection: sa.Connection, job_id: str) -> tuple[Venue, Result] | None:
     """What a calibration began with and what it found; None: it found no poses (yet), or the job is no calibration."""
     done = [j.id == job_id, j.kind == "calibration", j.result.is_not(None)]
-    query = sa.select(j.id, j.venue_document, j.venue_additions, j.result, j.result_additions)
+    query = sa.select(j.id, j.venue_document, j.result)
     row = connection.execute(query.where(*done)).one_or_none()
     if row is None:
         return None
     with reading_row("job", job_id):
-        return stored_venue(row.venue_document, row.venue_additions), stored_result(row.result, row.result_additions)
+        return stored_venue(row.venue_document), stored_result(row.result)
 
 
 def found_site(connection: sa.Connection, job_id: str) -> FoundSite | None:
@@ -233,10 +233,10 @@ def found_site(connection: sa.Connection, job_id: str) -> FoundSite | None:
     if row is None or row.kind != "find" or not row.result:
         return None
     with reading_row("job", job_id):
-        result = FindResult.model_validate(join_additions(row.result, row.result_additions), **TOLERANTLY)
+        result = FindResult.model_validate(row.result, **TOLERANTLY)
         if row.site is not None:
             return FoundSite(None, SoughtSite.model_validate(row.site, **TOLERANTLY), result)
-        venue = stored_venue(row.venue_document, row.venue_additions)
+        venue = stored_venue(row.venue_document)
         options = FindOptions.model_validate(row.options, **TOLERANTLY)
         return FoundSite(venue, SoughtSite.of(venue, options, row.frames), result)
 
@@ -246,7 +246,7 @@ def job_input_values(row: Any) -> dict[str, Any]:
     return {
         "job_id": row.id,
         "kind": row.kind,
-        "venue": row.venue_document and join_additions(row.venue_document, row.venue_additions),
+        "venue": row.venue_document,
         "site": row.site,
         "options": row.options,
         "frames": row.frames,
@@ -292,7 +292,7 @@ def _job_values(row: Any, position: int | None, callback: CallbackState | None, 
     moments = ("created_at", "started_at", "finished_at")
     return {name: getattr(row, name) for name in (*columns, *moments)} | {
         "queue_position": position,
-        "result": row.result and join_additions(row.result, row.result_additions),
+        "result": row.result,
         "callback": callback,
         # An address may be a secret, and how far its telling has come is said by `callback`.
         "options": {name: value for name, value in row.options.items() if name != "callback_url"},

@@ -14,7 +14,7 @@ from service.schemas.options import Options
 from service.schemas.venue import Venue
 from service.store import tables
 from service.store.database import Repository, advisory_lock, clock, reading, writing
-from service.store.documents import to_document, venue_columns
+from service.store.documents import to_document
 from service.store.events.event_log import add_queued_event
 from service.store.expiry import leave
 from service.store.jobs.attempts import Enqueue, end_without_result
@@ -201,7 +201,6 @@ def _insert(
     now: datetime,
     **more: Any,
 ) -> None:
-    document, additions = (None, None) if venue is None else venue_columns(venue)
     values = {
         "id": submission.job_id,
         "kind": submission.kind,
@@ -211,8 +210,7 @@ def _insert(
         "options": submission.options.model_dump(mode="json"),
         "content_hash": submission.content_hash,
         "idempotency_key": submission.idempotency_key,
-        "venue_document": document,
-        "venue_additions": additions,
+        "venue_document": None if venue is None else to_document(venue),
         "site": None if submission.site is None else to_document(submission.site),
         "frames": submission.frames,
         "asked_by": submission.origin.asked_by,

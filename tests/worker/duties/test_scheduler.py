@@ -222,19 +222,6 @@ def test_a_schedule_may_have_several_frames_of_each_camera_fused(home_of_schedul
     assert asked == [(3, 2.5)]
 
 
-def test_what_is_stored_of_a_schedule_names_frames_only_where_there_are_several(home_of_schedules):
-    home = home_of_schedules
-    put(home, "one")
-    put(home, "several", frames=2, spacing_s=7)
-    with home.engine.connect() as connection:
-        rows = {row.id: row for row in connection.execute(sa.select(tables.venues))}
-    # Never where 0.1.0 looks, which does not know them.
-    assert not any({"frames", "spacing_s"} & row.document["schedule"].keys() for row in rows.values())
-    assert rows["one"].additions is None
-    assert rows["several"].additions["of_parts"]["schedule"] == {"frames": 2, "spacing_s": 7}
-    assert home.venues.get("several").to_input().schedule.frames == 2
-
-
 def fail_with(kind):
     raise Problem(kind, "No frame.", camera="left")
 
