@@ -163,10 +163,7 @@ class WorkerQueue:
         for event in list(self._engine.background_thread_stop_events):
             event.set()
         self._queues = [
-            # The interval is for workers of 0.1.0, which have the engine look for itself.
-            DBOS.register_queue(
-                name, worker_concurrency=at_once, polling_interval_sec=POLL_S, on_conflict="always_update"
-            )
+            DBOS.register_queue(name, worker_concurrency=at_once, on_conflict="always_update")
             for name, at_once in self._at_once.items()
         ]
         self.take_over([self._worker])
