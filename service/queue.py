@@ -209,7 +209,7 @@ class WorkerQueue:
         return self._engine._active_workflows_set.count_for_queue(queue.name)
 
     def is_idle(self) -> bool:
-        """Whether every job that was taken has ended, and the queue knows. Private to the engine as well."""
+        """True if every claimed job has ended, and the queue knows. Private to the engine as well."""
         return not self._engine._active_workflows_set.activeList()
 
     def take_over(self, dead_workers: Collection[str]) -> None:
@@ -217,7 +217,7 @@ class WorkerQueue:
         DBOS._recover_pending_workflows(list(dead_workers))
 
     def given_up(self, job_ids: Collection[str]) -> dict[str, GivenUp]:
-        """Which of these jobs the queue will not begin again, and why."""
+        """Return those of the jobs that the queue will not begin again, with the reason."""
         found = DBOS.list_workflows(workflow_ids=list(job_ids), load_input=False, load_output=False)
         status = {workflow.workflow_id: workflow.status for workflow in found}
         unknown = dict.fromkeys(set(job_ids) - status.keys(), UNKNOWN)

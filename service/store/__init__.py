@@ -1,1 +1,1 @@
-"""What is kept: the database with all SQL, and the files."""
+"""Storage: the database, with all SQL of the service, and the files of jobs."""

@@ -60,9 +60,9 @@ def update_alarms(connection: sa.Connection, quality: VenueQuality, venue: Venue
 
 
 def _is_covered_by_venue_alarm(key: AlarmKey, rings: Mapping[AlarmKey, str]) -> bool:
-    """Whether the alarm of a camera says no more than one of the whole venue: such a one does not begin.
+    """True for the alarm of a camera while the same rule is broken for the whole venue: it does not begin.
 
-    One that rings already goes on, for its camera is no better.
+    An alarm that is active already goes on, for its camera is no better.
     """
     rule, camera = key
     return camera != "" and (rule, "") in rings
@@ -122,7 +122,7 @@ def _live(connection: sa.Connection, quality: VenueQuality, venue: Venue) -> dic
 
 
 def _drifting(connection: sa.Connection, venue: Venue) -> dict[AlarmKey, str]:
-    """The cameras that move slowly: what their control charts say, where that is so far that the rule minds."""
+    """Return the cameras whose control charts show a movement beyond the limit of the rule, with what they say."""
     limit_m = venue.alarms.trend_m if venue.alarms else None
     if limit_m is None:
         return {}
@@ -131,7 +131,7 @@ def _drifting(connection: sa.Connection, venue: Venue) -> dict[AlarmKey, str]:
 
 
 def _knocked(connection: sa.Connection, venue: Venue, quality: VenueQuality, newest: Revision) -> dict[AlarmKey, str]:
-    """The cameras that the last calibration found elsewhere, as long as the poses are those from before it."""
+    """Return the cameras that the last calibration found elsewhere, as long as the poses are those from before it."""
     if venue.alarms is None or not venue.alarms.knocked:
         return {}
     if quality.knocked is not None:

@@ -95,7 +95,7 @@ class Blobs:
 
     @property
     def is_folder(self) -> bool:
-        """Whether it is a folder, not a bucket."""
+        """True for a folder, False for a bucket."""
         return self._folder is not None
 
     @_raising_blob_outages
@@ -107,7 +107,7 @@ class Blobs:
 
     @_raising_blob_outages
     def copy(self, path: str, to: str) -> bool:
-        """Store an object a second time, as `put` does, without its bytes coming here; False if there is none."""
+        """Copy an object within the store, durable as with `put`; False if there is none."""
         try:
             if self._folder:
                 # obstore would link it, which not every file system can.
@@ -122,7 +122,7 @@ class Blobs:
 
     @_raising_blob_outages
     def move(self, path: str, to: str) -> bool:
-        """Let an object be found elsewhere; in a folder that takes no room. False if there is none.
+        """Move an object, in a folder without copying its bytes; False if there is none.
 
         In a bucket the object stays where it was as well.
         """
@@ -147,7 +147,7 @@ class Blobs:
 
     @_raising_blob_outages
     def get(self, path: str) -> bytes | None:
-        """An object, or None if there is none."""
+        """Return the bytes of an object, or None if there is none."""
         try:
             return obstore.get(self._store, path).bytes().to_bytes()
         except FileNotFoundError:
@@ -171,7 +171,7 @@ class Blobs:
 
     @_raising_blob_outages
     def has(self, path: str) -> bool:
-        """Whether there is such an object."""
+        """True if the store has an object at this path."""
         try:
             obstore.head(self._store, path)
         except FileNotFoundError:
@@ -190,7 +190,7 @@ class Blobs:
             obstore.delete(self._store, [entry["path"] for entry in page])
 
     def paths(self) -> Iterator[str]:
-        """The path of every object."""
+        """Yield the path of every object."""
         for page in obstore.list(self._store):
             for entry in page:
                 yield entry["path"]
@@ -241,14 +241,14 @@ def _credentials() -> S3Config:
 
 
 def _client_options(patience_s: float) -> ClientConfig:
-    """A bucket that takes a request and then says nothing uses up no more patience than there is."""
+    """Return client options whose timeout for one answer of a bucket is at most `patience_s`."""
     # Options given here replace those of the environment, of which this is one.
     plain = os.environ.get("AWS_ALLOW_HTTP", "").lower() in TRUE
     return {"timeout": timedelta(seconds=min(ANSWER_S, patience_s)), "allow_http": plain}
 
 
 def _retry_options(patience_s: float) -> RetryConfig:
-    """Ask again until the time is over, however often that is."""
+    """Return retry options that repeat a request until `patience_s` is over."""
     pauses: BackoffConfig = {"init_backoff": timedelta(seconds=0.1), "max_backoff": timedelta(seconds=2), "base": 2}
     return {"max_retries": 10_000, "retry_timeout": timedelta(seconds=patience_s), "backoff": pauses}
 

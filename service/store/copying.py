@@ -39,7 +39,7 @@ class CannotCopy(Exception):  # noqa: N818
 
 @contextmanager
 def exclusive_snapshot(url: str) -> Iterator[sa.Connection]:
-    """A transaction that sees one state of a database that nobody else uses, and that nobody changes meanwhile.
+    """Open a transaction on one state of a database that no other process uses or changes meanwhile.
 
     Raises `CannotCopy` if somebody uses it, or it has another schema than this program.
     """
@@ -102,7 +102,7 @@ def copy_rows(
 
 
 def counts_of(connection: sa.Connection, names: Collection[str]) -> dict[str, int]:
-    """How many rows tables have."""
+    """Return the number of rows of each table."""
     count = sa.func.count()
     return {
         name: connection.execute(sa.select(count).select_from(tables.metadata.tables[name])).scalar_one()
@@ -121,7 +121,7 @@ def _copy_table(source: sa.Connection, target: sa.Connection, table: sa.Table) -
 
 
 def _last_number(connection: sa.Connection, table: sa.Table, column: sa.Column[int]) -> int:
-    """The last number that a table has given, also if its row is no more: clients go on from numbers of events."""
+    """Return the last number that a table has assigned, even to a deleted row: clients continue from event numbers."""
     highest = connection.scalar(sa.select(sa.func.max(column))) or 0
     if connection.dialect.name == "postgresql":
         last = sa.text("SELECT pg_sequence_last_value(pg_get_serial_sequence(:table, :column)::regclass)")
@@ -134,7 +134,7 @@ def _last_number(connection: sa.Connection, table: sa.Table, column: sa.Column[i
 
 
 def _go_on_after(connection: sa.Connection, table: sa.Table, column: sa.Column[int], number: int) -> None:
-    """Have a table give the next number after this one."""
+    """Have a table assign the number after this one next."""
     if not number:
         return
     named = {"table": table.name, "number": number}
@@ -147,7 +147,7 @@ def _go_on_after(connection: sa.Connection, table: sa.Table, column: sa.Column[i
 
 
 def _exclusive(url: str) -> sa.Engine:
-    """An engine on SQLite of which the first transaction fails while anybody else has the file open."""
+    """Return an engine on SQLite whose first transaction fails while another process has the file open."""
     file = Path(sa.make_url(url).database or "")
     if not file.exists():
         raise CannotCopy(f"There is no service's database at {file}.")

@@ -70,11 +70,11 @@ JSON: dict[str, Any] = {"json_serializer": partial(json.dumps, allow_nan=False),
 
 
 class UnsupportedDatabase(Exception):  # noqa: N818
-    """This program, or this machine, cannot run the service on this database; the message says what to do."""
+    """Raised where this program or machine cannot use the database; the message says what to do."""
 
 
 def sqlite_file(url: str) -> Path | None:
-    """The file of an SQLite database; None where the address is one of PostgreSQL."""
+    """Return the file of an SQLite database, or None for PostgreSQL."""
     parsed = sa.make_url(url)
     return Path(parsed.database or "") if parsed.get_backend_name() == "sqlite" else None
 
@@ -92,7 +92,7 @@ def require_local_file(url: str) -> None:
 
 
 def connect(url: str) -> sa.Engine:
-    """An engine on SQLite in WAL mode or on PostgreSQL."""
+    """Return an engine on SQLite in WAL mode or on PostgreSQL."""
     file = sqlite_file(url)
     if file is None:
         return postgresql(url)
@@ -113,12 +113,12 @@ class _Hinting(SQLiteCompiler):
     """SQLite has hints (INDEXED BY), which SQLAlchemy takes and leaves out."""
 
     def get_from_hint_text(self, table: sa.FromClause, text: str | None) -> str | None:  # noqa: ARG002
-        """What follows the name of a table."""
+        """Return the hint that follows the name of a table."""
         return text
 
 
 def postgresql(url: str, limits: str = LIMITS) -> sa.Engine:
-    """An engine on PostgreSQL. `options` in the URL count before ours: `?options=-c%20statement_timeout%3D60s`.
+    """Return an engine on PostgreSQL. `options` in the URL count before ours: `?options=-c%20statement_timeout%3D60s`.
 
     Connections are not tried before each use, which would double the transactions. One that a server closed as it ended
     is made anew; one whose server vanished fails at its first use (`DATABASE_OUTAGES`), and then all of them are made
@@ -136,7 +136,7 @@ def postgresql(url: str, limits: str = LIMITS) -> sa.Engine:
 
 
 def without_timeouts(engine: sa.Engine) -> sa.Engine:
-    """The same connections, for transactions whose statements may take minutes, and nobody waits for."""
+    """Return an engine with the same connections, for background transactions whose statements may take minutes."""
     return engine.execution_options(**{UNLIMITED: True})
 
 
@@ -155,7 +155,7 @@ def _lift_limits(connection: sa.Connection) -> None:
 
 
 def outage_reason(error: Exception) -> str:
-    """Why one of `DATABASE_OUTAGES` was raised, for whoever asks the service for something."""
+    """Return in words for a client why one of `DATABASE_OUTAGES` was raised."""
     if isinstance(error, sa.exc.TimeoutError):
         return "All connections to its database are busy."
     state = getattr(getattr(error, "orig", None), "sqlstate", None)
@@ -180,14 +180,14 @@ def _begin_sqlite(connection: sa.Connection) -> None:
 
 @contextmanager
 def reading(engine: sa.Engine) -> Iterator[sa.Connection]:
-    """A transaction that sees one state of the database and takes no lock."""
+    """Open a transaction that sees one state of the database and takes no lock."""
     with engine.connect().execution_options(**SNAPSHOT[engine.dialect.name]) as connection, connection.begin():
         yield connection
 
 
 @contextmanager
 def writing(engine: sa.Engine) -> Iterator[sa.Connection]:
-    """A transaction alone with the database (SQLite) or at least with its rows (PostgreSQL)."""
+    """Open a transaction that locks the database (SQLite) or the rows that it writes (PostgreSQL)."""
     with engine.connect().execution_options(**{WRITES: True}) as connection, connection.begin():
         yield connection
 
@@ -202,7 +202,7 @@ def advisory_lock(connection: sa.Connection, about: str) -> None:
 
 
 def clock(connection: sa.Connection) -> datetime:
-    """The time by the one clock that every process of the service goes by, on whatever machine it runs."""
+    """Return the time of the clock that all processes share: that of PostgreSQL, or of the machine with SQLite."""
     if connection.dialect.name == "postgresql":
         now: datetime = connection.execute(sa.select(sa.func.clock_timestamp())).scalar_one()
         return now
@@ -210,13 +210,13 @@ def clock(connection: sa.Connection) -> datetime:
 
 
 class Repository:
-    """What is kept in a database about one subject, with all SQL about it."""
+    """Base of the classes that hold all SQL about one subject."""
 
     def __init__(self, engine: sa.Engine) -> None:
         self._engine = engine
 
     def now(self) -> datetime:
-        """The time that all processes go by, see `clock`."""
+        """Return the time of the database, see `clock`."""
         with reading(self._engine) as connection:
             return clock(connection)
 

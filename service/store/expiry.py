@@ -1,4 +1,4 @@
-"""What is past its time: all SQL about it.
+"""Expiry of frames, pictures, jobs, revisions and events: all SQL about it.
 
 Rows first, files after. A row stops answering for its files in the transaction that puts their folder on the list of
 leftovers, and the folder leaves the list once its files are gone. Whoever dies in between leaves an entry on the list:
@@ -46,7 +46,7 @@ NOT_THE_LAST_ACCEPTED = j.id != sa.func.coalesce(LAST_ACCEPTED, "")
 
 @dataclass(frozen=True)
 class OldFrames:
-    """The frames of a job: the path of one of each camera, and the names of pictures that may be drawn of them yet.
+    """The frames of a job: one path of each camera, and the names of pictures that can still be drawn from them.
 
     `folder`: where its pictures lie.
     """
@@ -58,10 +58,10 @@ class OldFrames:
 
 
 class ExpiryRepository(Repository):
-    """What the database knows to be past its time."""
+    """The rows and files in the database that have expired."""
 
     def old_frames(self, ended_before: datetime, limit: int) -> list[OldFrames]:
-        """The frames of up to `limit` jobs that ended before a moment, the oldest first."""
+        """Return the frames of up to `limit` jobs that ended before a moment, the oldest first."""
         query = (
             sa.select(j.id, j.kind, j.run_token, j.pictures, j.pictures_deleted_at, j.frames)
             .where(j.finished_at < ended_before, j.frames_deleted_at.is_(None))
@@ -88,7 +88,7 @@ class ExpiryRepository(Repository):
             leave(connection, [frame_folder(job_id) for job_id in job_ids], now)
 
     def expire_pictures(self, ended_before: datetime, now: datetime, limit: int) -> int:
-        """The same for pictures, but for those of the last accepted job of each venue."""
+        """Let ended jobs have no pictures, but for the last accepted job of each venue; return their number."""
         with writing(self._engine) as connection:
             advisory_lock(connection, "expiry")
             ids = self._ended(connection, ended_before, limit, j.pictures_deleted_at.is_(None), NOT_THE_LAST_ACCEPTED)
@@ -97,7 +97,7 @@ class ExpiryRepository(Repository):
             return len(ids)
 
     def old_jobs(self, ended_before: datetime, limit: int) -> list[str]:
-        """Up to `limit` jobs that ended before a moment, the oldest first, but for the last accepted of each venue."""
+        """Return up to `limit` jobs that ended before a moment, oldest first, but the last accepted of each venue."""
         with reading(self._engine) as connection:
             return self._ended(connection, ended_before, limit, NOT_THE_LAST_ACCEPTED)
 
@@ -184,18 +184,18 @@ class ExpiryRepository(Repository):
             leave(connection, [of(job_id) for job_id in job_ids for of in (frame_folder, pictures_folder)], now)
 
     def leftovers(self, now: datetime, limit: int) -> list[str]:
-        """Up to `limit` folders whose files are to be deleted."""
+        """Return up to `limit` folders whose files are to be deleted."""
         query = sa.select(left.folder).where(left.due_at <= now).order_by(left.due_at).limit(limit)
         with reading(self._engine) as connection:
             return list(connection.scalars(query))
 
     def forget_leftovers(self, folders: Collection[str]) -> None:
-        """The files of these folders are gone."""
+        """Remove folders from the list after their files were deleted."""
         with writing(self._engine) as connection:
             connection.execute(sa.delete(tables.leftovers).where(left.folder.in_(folders)))
 
     def postpone(self, folder: str, until: datetime) -> None:
-        """The files of a folder cannot be deleted now."""
+        """Postpone the deletion of the files of a folder."""
         with writing(self._engine) as connection:
             connection.execute(sa.update(tables.leftovers).where(left.folder == folder).values(due_at=until))
 
@@ -212,7 +212,7 @@ class ExpiryRepository(Repository):
 
 
 def leave(connection: sa.Connection, folders: Collection[str], due_at: datetime) -> None:
-    """Have the files of folders deleted at a time, when and if the caller's transaction commits."""
+    """Schedule the deletion of the files of folders, inside the caller's transaction."""
     connection.execute(sa.delete(tables.leftovers).where(left.folder.in_(folders)))
     rows = [{"folder": folder, "due_at": due_at} for folder in folders]
     if rows:

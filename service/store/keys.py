@@ -22,7 +22,7 @@ k = api_keys.c
 
 @dataclass(frozen=True)
 class Key:
-    """What is known about a key."""
+    """An API key, without the key itself."""
 
     name: str
     hash: str
@@ -34,26 +34,26 @@ class Key:
     venues: frozenset[str] | None = None
 
     def is_for(self, venue_id: str | None) -> bool:
-        """Whether its owner may know of a venue. What belongs to none (None) is for keys of all venues only."""
+        """True if the key gives access to a venue; what belongs to none (None) is for keys of all venues only."""
         return self.venues is None or venue_id in self.venues
 
     @property
     def expired(self) -> bool:
-        """Whether its time is over."""
+        """True if the key has expired."""
         return self.expires_at is not None and self.expires_at <= datetime.now(UTC)
 
 
 class KeyExists(Exception):  # noqa: N818
-    """There is a key of this name."""
+    """Raised where a key of this name exists."""
 
 
 def new_key() -> str:
-    """256 random bits behind a prefix that people, and scanners for leaked secrets, recognise."""
+    """Return a new key: 256 random bits behind a prefix that people, and scanners for leaked secrets, recognise."""
     return PREFIX + secrets.token_urlsafe(32)
 
 
 def hash_of(key: str) -> str:
-    """What is stored of a key and what it is looked up by: its SHA-256.
+    """Return the SHA-256 of a key, which is stored and looked up.
 
     Slow and salted hashes are for passwords, which people choose and others guess. Nobody guesses 256 random bits, so a
     fast hash gives nothing away, and it can be looked up: how long that takes depends on the hash of what was sent,
@@ -63,7 +63,7 @@ def hash_of(key: str) -> str:
 
 
 def old_name(name: str) -> str:
-    """What a key is called once it was exchanged; names are as long as before."""
+    """Return the name of a key after its rotation, which is as long as before at most."""
     return f"{name[: LONGEST_NAME - len(OLD)]}{OLD}"
 
 
@@ -117,17 +117,17 @@ class KeyRepository(Repository):
             return connection.execute(sa.delete(api_keys).where(k.name == name)).rowcount == 1
 
     def all(self) -> list[Key]:
-        """Every key, by name."""
+        """Return all keys, by name."""
         with reading(self._engine) as connection:
             return [key_in(row) for row in connection.execute(sa.select(api_keys).order_by(k.name))]
 
     def any(self) -> bool:
-        """Whether there is a key. An expired one counts: time alone must not open a service."""
+        """True if there is a key. An expired one counts: time alone must not open a service."""
         with reading(self._engine) as connection:
             return connection.scalar(sa.select(k.name).limit(1)) is not None
 
     def find(self, hash_: str) -> Key | None:
-        """The key with this hash."""
+        """Return the key with this hash, or None."""
         with reading(self._engine) as connection:
             row = connection.execute(sa.select(api_keys).where(k.hash == hash_)).one_or_none()
         return None if row is None else key_in(row)
@@ -143,6 +143,6 @@ class KeyRepository(Repository):
 
 
 def key_in(row: Any) -> Key:
-    """The key in a row of the table."""
+    """Return the key in a row of the table."""
     venues = None if row.venues is None else frozenset(row.venues)
     return Key(row.name, row.hash, row.scope, row.created_at, row.expires_at, row.last_used_at, venues)

@@ -33,7 +33,7 @@ m = tables.live_minutes.c
 
 @dataclass(frozen=True)
 class LiveGauges:
-    """How the live poses of a venue are doing; None: no camera of it is tracked, or none had a picture lately."""
+    """Figures of the live poses of a venue for /metrics; None where no camera is tracked or had a picture lately."""
 
     venue: str
     running: bool
@@ -54,11 +54,11 @@ class LiveRepository(Repository):
             _add_to_minute(connection, venue_id, report, now)
 
     def state(self, venue_id: str) -> LiveState:
-        """The newest report of a venue; of one that has none, or is not there, an empty state."""
+        """Return the newest report of a venue, or an empty state."""
         return self.newest([venue_id]).get(venue_id, LiveState())
 
     def newest(self, venue_ids: Collection[str]) -> Mapping[str, LiveState]:
-        """The newest report of each of these venues that is there."""
+        """Return the newest report of each of these venues that exists."""
         v = tables.venues.c
         query = (
             sa.select(v.id.label("venue"), r.reported_at, r.document, r.watched)
@@ -70,12 +70,12 @@ class LiveRepository(Repository):
             return {row.venue: _state(row, now) for row in connection.execute(query)}
 
     def reported_lately(self, venue_id: str) -> LiveState | None:
-        """The newest report of a venue if it is not older than a day."""
+        """Return the newest report of a venue, or None if it is older than a day."""
         state = self.state(venue_id)
         return state if state.reported_at is not None and self.now() - state.reported_at <= LATELY else None
 
     def history(self, venue_id: str, minutes: int) -> list[LiveMinute]:
-        """The reports of the last so many minutes by the minute, oldest first."""
+        """Return the reports of the last so many minutes by the minute, oldest first."""
         with reading(self._engine) as connection:
             since = clock(connection) - timedelta(minutes=minutes)
             query = sa.select(tables.live_minutes).where(m.venue == venue_id, m.minute >= since).order_by(m.minute)
@@ -83,7 +83,7 @@ class LiveRepository(Repository):
 
 
 def live_gauges(connection: sa.Connection, most: int, now: datetime) -> list[LiveGauges]:
-    """The figures of up to `most` venues that have reported within a day, those that reported last."""
+    """Return the figures of up to `most` venues that have reported within a day, those that reported last."""
     query = sa.select(tables.live_reports).where(r.reported_at >= now - LATELY)
     rows = connection.execute(query.order_by(r.reported_at.desc()).limit(most)).all()
     lately = sa.select(tables.live_minutes).where(

@@ -81,16 +81,16 @@ class WatchedSender(Schema):
 
 @dataclass(frozen=True)
 class LiveWatch:
-    """What the alarms of a venue's live poses go by: each process that sends them, the one that reported last first."""
+    """State behind the alarms of a venue's live poses: the processes that send them, the last to report first."""
 
     senders: list[WatchedSender]
 
     def broken(self, now: datetime) -> dict[AlarmKey, str]:
-        """The rules that are broken at a time, with their reasons."""
+        """Return the rules that are broken at a time, with their reasons."""
         return {key: why for key, (at, why) in self._deadlines().items() if at <= now}
 
     def next_deadline(self, now: datetime) -> datetime | None:
-        """When the next rule is broken, unless a better report comes before."""
+        """Return when the next rule is broken, unless a better report comes before."""
         return min((at for at, _ in self._deadlines().values() if at > now), default=None)
 
     def missed(self) -> list[WatchedSender]:
@@ -175,7 +175,7 @@ def watched_columns(watch: LiveWatch) -> tuple[dict[str, Any], dict[str, Any]]:
 
 
 def due_after(before: LiveWatch | None, due_at: datetime | None, after: LiveWatch, now: datetime) -> datetime | None:
-    """When the alarms are to be looked at, after a report; `due_at`: when they were to be before it."""
+    """Return when the alarms are to be evaluated after a report; `due_at`: when they were to be before it."""
     if due_at is not None and due_at <= now:
         return due_at
     is_news = before is not None and before.broken(now).keys() != after.broken(now).keys()
@@ -183,7 +183,7 @@ def due_after(before: LiveWatch | None, due_at: datetime | None, after: LiveWatc
 
 
 def due(connection: sa.Connection, now: datetime, limit: int) -> Sequence[str]:
-    """Up to `limit` venues whose alarms of live poses are to be looked at."""
+    """Return up to `limit` venues whose alarms of live poses are to be evaluated."""
     query = sa.select(r.venue).where(r.alarm_due_at <= now).order_by(r.alarm_due_at).limit(limit)
     return connection.scalars(query).all()
 

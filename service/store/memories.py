@@ -2,7 +2,7 @@
 
 The engine writes and reads a memory; to the service it is a JSON object. The memories of a venue are one document,
 camera id to memory, and a row belongs to the revision with which the document came, so that undoing a revision takes
-its nights back too. A venue without a row has no memories yet, as one of an earlier release.
+its nights back too. A venue without a row has no memories yet.
 """
 
 from __future__ import annotations
@@ -33,13 +33,13 @@ log = structlog.get_logger()
 
 
 def newest_memories(connection: sa.Connection, venue_id: str) -> Memories:
-    """The memories that hold now, {} if there are none."""
+    """Return the memories in use, {} if there are none."""
     query = sa.select(m.document).where(m.venue == venue_id).order_by(m.revision.desc()).limit(1)
     return _memories_in(venue_id, connection.scalar(query))
 
 
 def memories_at(connection: sa.Connection, venue_id: str, revision: int) -> Memories:
-    """The memories that came with a revision, {} if none did or if they are kept no more."""
+    """Return the memories that came with a revision, {} if none did or they have expired."""
     query = sa.select(m.document).where(m.venue == venue_id, m.revision == revision)
     return _memories_in(venue_id, connection.scalar(query))
 
@@ -50,7 +50,7 @@ def revisions_with_memories(connection: sa.Connection, venue_id: str) -> set[int
 
 
 def keep_memories(connection: sa.Connection, venue_id: str, revision: int, memories: Memories) -> None:
-    """Let a new revision of a venue have these memories, inside the caller's serialised transaction."""
+    """Store the memories of a new revision of a venue, inside the caller's serialised transaction."""
     kept = _unless_too_large(venue_id, memories)
     if not kept and not newest_memories(connection, venue_id):
         return
@@ -65,7 +65,7 @@ def forget_memories(connection: sa.Connection, venue_id: str) -> None:
 
 
 def without_those_that_changed(memories: Memories, before: Venue, after: Venue) -> Memories:
-    """The memories of the cameras that stand and image in one venue as in another."""
+    """Return the memories of the cameras whose pose and lens are the same in both venues."""
     stood = {camera.id: camera for camera in before.poses_and_lenses}
     same = {camera.id for camera in after.poses_and_lenses if stood.get(camera.id) == camera}
     return {camera: memory for camera, memory in memories.items() if camera in same}

@@ -1,4 +1,4 @@
-"""How far a camera moved: degrees, metres, and pixels of the pitch in its picture.
+"""Movement of a camera between two poses: degrees, metres, and pixels of the pitch in its picture.
 
 For history, alarms and what is said of a pose that was put, which the service writes itself: `quality.Moved` of the
 engine, on fewer points and a flat pitch. Lenses are OpenCV's own, which takes its time to load: import this where a
@@ -29,7 +29,7 @@ NEAREST, WIDEST, STEPS = 1e-4, 6.0, 600
 
 
 def moved(field: FieldOfPlay, before: PosedCamera, after: PosedCamera) -> Moved:
-    """From one state of a camera to another. `pixels`: None where no marking was in view, or sizes differ."""
+    """Return how far a camera moved between two states; `pixels`: None without markings in view, or if sizes differ."""
     return Moved(
         rotation_deg=turned_deg(before, after),
         position_m=math.dist(before.pose.position, after.pose.position),
@@ -46,19 +46,19 @@ def turned_deg(before: PosedCamera, after: PosedCamera) -> float:
 
 
 def _rotation(camera: PosedCamera) -> Array:
-    """World to camera (3, 3)."""
+    """Return the rotation (3, 3) from world to camera."""
     return np.asarray(cv2.Rodrigues(np.array(camera.pose.rotation, dtype=float))[0], dtype=float)
 
 
 def visible_m(field: FieldOfPlay, camera: PosedCamera) -> float:
-    """Metres of markings in a camera's picture, to within some metres: the ground is flat and the places are few."""
+    """Return the length of markings in a camera's picture, m, to within some metres, on flat ground."""
     points = points_on_markings(field)
     length = sum(shape.length for shape in field.markings if not isinstance(shape, Spot))
     return float(_inside(camera, pixels(camera, points)).mean() * length)
 
 
 def _shift_px(field: FieldOfPlay, before: PosedCamera, after: PosedCamera) -> float | None:
-    """The mean over the markings that were in view."""
+    """Return the mean shift over the markings that were in view, px, or None where none was."""
     points = points_on_markings(field)
     was, now = pixels(before, points), pixels(after, points)
     in_view = _inside(before, was) & np.isfinite(now).all(axis=1)
@@ -66,12 +66,12 @@ def _shift_px(field: FieldOfPlay, before: PosedCamera, after: PosedCamera) -> fl
 
 
 def _inside(camera: PosedCamera, places: Array) -> NDArray[np.bool_]:
-    """Which pixels (N, 2) lie in a camera's picture."""
+    """Return a mask (N) of the pixels (N, 2) that lie in a camera's picture."""
     return np.asarray(((places >= 0) & (places <= np.array(camera.image_size) - 1)).all(axis=1))
 
 
 def points_on_markings(field: FieldOfPlay) -> Array:
-    """Places on the markings of a field (N, 2), evenly along them."""
+    """Return points (N, 2) on the markings of a field, evenly along them."""
     return _points_on(field.markings)
 
 
@@ -96,13 +96,13 @@ def _along(shape: Shape, spacing: float) -> Array:
 
 
 def _shares(length: float, spacing: float) -> Array:
-    """The middles of equal pieces of 0..1, (N, 1)."""
+    """Return the middles (N, 1) of equal pieces of 0..1."""
     pieces = max(1, round(length / spacing)) if spacing else 1
     return ((np.arange(pieces) + 0.5) / pieces)[:, None]
 
 
 def pixels(camera: PosedCamera, points: Array) -> Array:
-    """Where points of the ground (N, 2) are in the picture; NaN behind the camera and where no lens formula holds."""
+    """Project points of the ground (N, 2) into the picture (N, 2); NaN behind the camera and beyond the lens model."""
     on_ground = np.column_stack([points, np.zeros(len(points))])
     seen_from_camera = on_ground @ _rotation(camera).T + camera.pose.translation
     across, depth = np.hypot(*seen_from_camera.T[:2]), seen_from_camera[:, 2]
@@ -117,7 +117,7 @@ def pixels(camera: PosedCamera, points: Array) -> Array:
 
 
 def _turning_back(model: LensModel, distortion: Array) -> float:
-    """The distance from the axis (tangent) from which a lens formula takes points back towards the middle."""
+    """Return the tangent of the angle from the axis beyond which a lens model maps points back towards the middle."""
     distances = np.concatenate([[0.0], np.geomspace(NEAREST, WIDEST, STEPS)])
     rays = np.column_stack([distances, np.zeros_like(distances), np.ones_like(distances)])
     radial = distortion.copy()
@@ -129,7 +129,7 @@ def _turning_back(model: LensModel, distortion: Array) -> float:
 
 
 def _distorted(model: LensModel, distortion: Array, rays: Array) -> Array:
-    """Rays (N, 3) to image coordinates (N, 2) for a camera matrix of 1: OpenCV knows no skew."""
+    """Project rays (N, 3) to image coordinates (N, 2) with a camera matrix of 1: OpenCV knows no skew."""
     project = cv2.fisheye.projectPoints if model == "fisheye" else cv2.projectPoints
     places, _ = project(rays[:, None], np.zeros(3), np.zeros(3), np.eye(3), distortion)
     return np.asarray(places, dtype=float).reshape(-1, 2)

@@ -1,4 +1,4 @@
-"""Everything that has SQL, on one database."""
+"""All repositories on one database."""
 
 from __future__ import annotations
 

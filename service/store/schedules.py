@@ -39,7 +39,7 @@ class Firing:
 
 @dataclass(frozen=True)
 class Due:
-    """The time, and how many schedules nobody has begun to fire that are due by then, in each lane."""
+    """The time, and the number of due schedules in each lane that no worker has claimed."""
 
     now: datetime
     quick: int
@@ -76,13 +76,13 @@ class ScheduleRepository(Repository):
             return [_firing(row) for row in rows]
 
     def done(self, firing: Firing, now: datetime, job_id: str | None, error: str | None) -> None:
-        """Wait for the next time. `error`: why there is no job."""
+        """End a firing and wait for the next time. `error`: why there is no job."""
         next_at = _next(firing.venue_id, firing, now)
         brought = {} if job_id is None else {"last_job": job_id}
         self._write(firing, error, due_at=next_at, look_at=next_at, last_at=firing.due_at, **brought)
 
     def postpone(self, firing: Firing, until: datetime, why: str) -> None:
-        """Fire it again at a moment, for the time that it was due at."""
+        """Repeat a firing later, for the time that it was due at."""
         self._write(firing, why, look_at=until)
 
     def fetched(self, firing: Firing, *, slowly: bool) -> None:
@@ -129,7 +129,7 @@ class ScheduleRepository(Repository):
 
 
 def reserved_places(connection: sa.Connection, now: datetime, at_most: int) -> int:
-    """How many places in the queue are kept for schedules that are due, or whose frames are being fetched.
+    """Return the number of places in the queue that are kept for schedules that are due or fetching their frames.
 
     None is kept for those whose cameras gave no frame the last time, which most likely will give none again, nor for
     those that were put off, until they are looked at again.
@@ -140,7 +140,7 @@ def reserved_places(connection: sa.Connection, now: datetime, at_most: int) -> i
 
 
 def lateness_s(connection: sa.Connection, now: datetime) -> tuple[float, float]:
-    """For how many seconds the schedule has been due that has waited longest, in the quick and in the slow lane."""
+    """Return the longest time that a schedule has been due, in the quick and in the slow lane."""
     first, slow = sa.func.min(s.due_at, type_=s.due_at.type), sa.case((IN_SLOW_LANE, 1), else_=0)
     query = sa.select(slow.label("slow"), first.label("first")).where(s.due_at <= now).group_by(slow)
     late = {row.slow: (now - row.first).total_seconds() for row in connection.execute(query)}
@@ -161,7 +161,7 @@ def plan_schedule(connection: sa.Connection, venue: Venue) -> None:
 
 
 def schedule_of(connection: sa.Connection, venue_id: str) -> ScheduleState | None:
-    """When a venue is calibrated next, and what came of the last time."""
+    """Return the next time of a venue's schedule and the outcome of the last one; None without a schedule."""
     row = connection.execute(sa.select(tables.schedules).where(s.venue == venue_id)).one_or_none()
     if row is None:
         return None

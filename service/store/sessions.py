@@ -1,4 +1,4 @@
-"""Who is signed in with a browser, and with which key. What is stored is a hash; the token itself is in a cookie."""
+"""Browser sessions and the keys that they began with. A hash is stored; the token itself is in a cookie."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class SessionRepository(Repository):
         return token
 
     def key_of(self, hash_: str) -> Key | None:
-        """The key that the session with this hash began with; None if either is no more."""
+        """Return the key that the session with this hash began with; None if either has ended."""
         query = (
             sa.select(api_keys)
             .join(sessions, s.key_hash == api_keys.c.hash)

@@ -1,4 +1,4 @@
-"""From the rows of a camera's trend to what is said of it: a point a night, control charts, a state, a sentence.
+"""Control charts of a camera's trend: a point a night, a state and a sentence, from its rows.
 
 Nights are days of UTC. Where a schedule calibrates many times a day, the mean of the day counts: the sun warms a mast
 and lets it cool again, which is no trend.
@@ -53,7 +53,7 @@ class Series:
         return sum(night is not None for night in self.nights) >= NIGHTS_OF_BASELINE
 
     def mean(self, number: int) -> float:
-        """Where the moving average is beside what is usual after a night, in the quantity's own unit."""
+        """Return the moving average beside the baseline after a night, in the quantity's own unit."""
         known = (n for n in range(number, -1, -1) if self.points[n] is not None)
         last = next(known, None)
         if last is None:
@@ -64,7 +64,7 @@ class Series:
         return point.ewma * self.baseline.spread(night)
 
     def last(self, number: int) -> ChartPoint | None:
-        """Where the charts stand after a night."""
+        """Return the newest point of the charts up to a night, or None."""
         return next((point for point in reversed(self.points[: number + 1]) if point is not None), None)
 
 
@@ -77,21 +77,21 @@ class CameraCharts:
 
     @classmethod
     def of(cls, rows: Rows, settled: Mapping[str, Baseline]) -> CameraCharts:
-        """From the rows since its anchor, oldest first; `settled`: the baselines that are known for good."""
+        """Chart the rows since an anchor, oldest first; `settled`: the baselines that are known for good."""
         nights = [list(several) for _, several in groupby(rows, lambda row: row.at.date())]
         return cls(nights, [_series(quantity, nights, settled.get(quantity)) for quantity in QUANTITIES])
 
     @property
     def settled(self) -> dict[str, Baseline]:
-        """The baselines that no later night changes."""
+        """Baselines that no later night changes, by quantity."""
         return {series.quantity: series.baseline for series in self.series if series.is_settled}
 
     def beyond(self, number: int) -> list[Series]:
-        """The quantities whose mean has moved, by either chart, after a night."""
+        """Return the quantities whose mean has moved, by either chart, after a night."""
         return [series for series in self.series if (last := series.last(number)) is not None and last.is_beyond]
 
     def moved_m(self, number: int) -> float:
-        """How far means have moved at the far touchline: those that charts say have, or the pose while none has."""
+        """Return the movement at the far touchline, m: of quantities beyond their limits, or else of the pose."""
         beyond = {series.quantity for series in self.beyond(number)}
         across, away, focal = (series.mean(number) for series in self.series)
         of_lens_m = abs(focal) * self.nights[number][-1].focal_length_m
@@ -100,12 +100,12 @@ class CameraCharts:
         return max(0.0 if by_lens_alone else of_pose_m, of_lens_m if "focal-length" in beyond else 0.0)
 
     def cusum(self, number: int) -> float:
-        """The largest cumulative sum of all quantities after a night."""
+        """Return the largest cumulative sum of all quantities after a night."""
         known = [last for series in self.series if (last := series.last(number)) is not None]
         return max((max(point.high, point.low) for point in known), default=0.0)
 
     def state(self, number: int, alarm_m: float) -> TrendState:
-        """How the camera is doing after a night."""
+        """Return the state of the camera after a night."""
         beyond = bool(self.beyond(number))
         if beyond or number + 1 >= NIGHTS_TO_JUDGE:
             return state_of(beyond=beyond, moved_m=self.moved_m(number), alarm_m=alarm_m)
@@ -119,7 +119,7 @@ class CameraCharts:
         return hypot(across, away), _sigma_m(last, across, away)
 
     def words(self, camera: str) -> str:
-        """What there is to say after the last night."""
+        """Return a sentence about the camera after the last night."""
         number = len(self.nights) - 1
         beyond = self.beyond(number)
         if not beyond and number + 1 < NIGHTS_TO_JUDGE:
@@ -153,7 +153,7 @@ class CameraCharts:
         )
 
     def trend(self, venue: str, camera: str, anchor: int, alarm_m: float, since: datetime | None) -> Trend:
-        """All of it; `since`: without the nights before that."""
+        """Return the whole trend; `since`: without the nights before that."""
         number = len(self.nights) - 1
         told = [n for n, rows in enumerate(self.nights) if since is None or rows[-1].at >= since]
         return Trend(
@@ -170,7 +170,7 @@ class CameraCharts:
         )
 
     def _since(self, several: Sequence[Series]) -> str:
-        """When the first of them seems to have begun to move."""
+        """Return in words when the first of several quantities began to move."""
         last = [series.last(len(self.nights) - 1) for series in several]
         begun = [point.since for point in last if point is not None and point.since is not None]
         return f"since {_date(self.nights[min(begun, default=0)][0].at)}"
@@ -208,7 +208,7 @@ class CameraCharts:
 
 
 def state_of(*, beyond: bool, moved_m: float, alarm_m: float) -> TrendState:
-    """`drifting` once a chart says that a mean has moved, `alarm` if that is by `alarm_m` at the far touchline."""
+    """Return `drifting` once a mean has moved, `alarm` if by `alarm_m` at the far touchline, else `quiet`."""
     if not beyond:
         return "quiet"
     return "alarm" if moved_m >= alarm_m else "drifting"
@@ -249,7 +249,7 @@ def _chart(series: Series, number: int, focal_length_m: float) -> Chart | None:
 
 
 def _sigma_m(rows: Rows, across_m: float, away_m: float) -> float:
-    """One standard deviation of a displacement along itself; of none, the larger of both."""
+    """Return the standard deviation of a displacement along its own direction, m; of a zero one, the larger of both."""
     across, away = _median(rows, "sigma_across_m") or 0.0, _median(rows, "sigma_away_m") or 0.0
     length = hypot(across_m, away_m)
     if length == 0:

@@ -1,4 +1,4 @@
-"""How each camera of a venue has moved since its anchor, job by job. All SQL about it.
+"""Movement of each camera of a venue since its anchor, job by job. All SQL about it.
 
 A job's worker compares a camera with the anchor that it was given; what it says is kept where that anchor still is the
 camera's. Undoing takes it back: who restores a revision forgets the anchors and the rows that came after it.
@@ -32,7 +32,7 @@ t = tables.camera_trend.c
 
 @dataclass(frozen=True)
 class CameraTrend:
-    """What the charts of a camera said after its last night; `moved_m` and `cusum` are None before the first."""
+    """Control charts of a camera after its last night; `moved_m` and `cusum` are None before the first."""
 
     venue: str
     camera: str
@@ -42,7 +42,7 @@ class CameraTrend:
     words: str
 
     def state(self, alarm_m: float) -> TrendState:
-        """How the camera is doing, where so many metres at the far touchline are an alarm."""
+        """Return the state of the camera, where so many metres at the far touchline are an alarm."""
         return state_of(beyond=self.beyond, moved_m=self.moved_m or 0.0, alarm_m=alarm_m)
 
 
@@ -50,7 +50,7 @@ class TrendRepository(Repository):
     """The trends of the cameras in the database."""
 
     def of(self, venue: Venue, camera: str, since: datetime | None = None) -> Trend:
-        """The trend of one camera since its anchor; `since`: only the nights from then on are told, all are charted."""
+        """Return the trend of one camera since its anchor; `since`: points before it are left out, yet charted."""
         with reading(self._engine) as connection:
             anchor = _newest_anchors(connection, venue.id).get(camera)
             rows = _rows(connection, venue.id, [camera])[camera]
@@ -58,13 +58,13 @@ class TrendRepository(Repository):
 
 
 def alarm_m_of(venue: Venue) -> float:
-    """What a shift at the far touchline amounts to that is an alarm, by the rules of a venue or the usual."""
+    """Return the shift at the far touchline that is an alarm, m, by the rules of a venue or the default."""
     limit = venue.alarms.trend_m if venue.alarms else None
     return ALARM_M if limit is None else limit
 
 
 def anchors_of(connection: sa.Connection, venue_id: str) -> dict[str, Anchor]:
-    """What to compare cameras with, by camera, of those that have had a pose accepted since they were put."""
+    """Return the anchors of cameras, by camera, of those that have had a pose accepted since they were put."""
     newest = _newest_anchors(connection, venue_id)
     posed = {camera: row.posed for camera, row in newest.items() if row.posed is not None}
     return {
@@ -74,7 +74,7 @@ def anchors_of(connection: sa.Connection, venue_id: str) -> dict[str, Anchor]:
 
 
 def trends_of(connection: sa.Connection, venue_id: str) -> dict[str, CameraTrend]:
-    """What the charts said last, by camera, inside the caller's transaction."""
+    """Return the newest trends of a venue, by camera, inside the caller's transaction."""
     return {
         camera: CameraTrend(venue_id, camera, row.beyond, row.moved_m, row.cusum, row.words)
         for camera, row in _newest_anchors(connection, venue_id).items()
@@ -82,7 +82,7 @@ def trends_of(connection: sa.Connection, venue_id: str) -> dict[str, CameraTrend
 
 
 def most_moved(connection: sa.Connection, most: int) -> list[CameraTrend]:
-    """What the charts said last of the cameras that have moved farthest, inside the caller's transaction."""
+    """Return the trends of the cameras that have moved farthest, inside the caller's transaction."""
     query = sa.select(tables.camera_anchors).where(c.moved_m.is_not(None)).order_by(c.moved_m.desc()).limit(most)
     return [
         CameraTrend(row.venue, row.camera, row.beyond, row.moved_m, row.cusum, row.words)
@@ -91,7 +91,7 @@ def most_moved(connection: sa.Connection, most: int) -> list[CameraTrend]:
 
 
 def begin_anchors(connection: sa.Connection, venue: Venue, changed: Collection[str], revision: int) -> None:
-    """Somebody has put cameras where they are now: the first pose that is accepted from then on is their anchor."""
+    """Begin new anchors of changed cameras: the first pose that is accepted from now on becomes the anchor."""
     for table in (tables.camera_anchors, tables.camera_trend):
         gone = table.c.camera.not_in([camera.id for camera in venue.cameras])
         connection.execute(sa.delete(table).where(table.c.venue == venue.id, gone))
@@ -106,7 +106,7 @@ def forget_trends(connection: sa.Connection, venue_id: str) -> None:
 
 
 def go_back(connection: sa.Connection, venue: Venue, revision: int) -> None:
-    """A revision of a venue holds again: what came after it is forgotten, and the trends are those of that time."""
+    """Rewind the trends of a venue to a revision; what came after it is deleted."""
     connection.execute(sa.delete(tables.camera_anchors).where(c.venue == venue.id, c.revision > revision))
     connection.execute(sa.delete(tables.camera_trend).where(t.venue == venue.id, t.revision > revision))
     cameras = [camera.id for camera in venue.cameras]
@@ -169,7 +169,7 @@ def _add_anchor(connection: sa.Connection, venue_id: str, camera: str, revision:
 
 
 def _nothing_said(camera: str) -> dict[str, Any]:
-    """Of an anchor that no pose was accepted for yet."""
+    """Return the columns of an anchor without an accepted pose."""
     nothing: dict[str, Any] = {
         "at": None,
         "posed": None,
@@ -232,7 +232,7 @@ def _chart(
 
 
 def _said(camera: str, since: Sequence[Any], anchor: Any) -> dict[str, Any]:
-    """What the charts of a camera say, by the rows since its anchor."""
+    """Return the chart columns of an anchor, by the rows since it."""
     charts = CameraCharts.of(since, _baselines(anchor))
     last = len(charts.nights) - 1
     return {
@@ -245,7 +245,7 @@ def _said(camera: str, since: Sequence[Any], anchor: Any) -> dict[str, Any]:
 
 
 def _trim(connection: sa.Connection, rows: Sequence[Any]) -> None:
-    """Keep so many rows as is said above: of days with several jobs the last one, and then the newest days."""
+    """Delete rows beyond `KEPT_ROWS`: earlier ones of a day with several jobs first, then the oldest days."""
     excess = len(rows) - KEPT_ROWS
     if excess <= 0:
         return
@@ -279,7 +279,7 @@ def _baselines(anchor: Any) -> Mapping[str, Baseline]:
 
 
 def _rows(connection: sa.Connection, venue_id: str, cameras: Collection[str]) -> dict[str, list[Any]]:
-    """All rows of cameras, oldest first, by camera."""
+    """Return all rows of cameras, oldest first, by camera."""
     of_cameras = (t.venue == venue_id, t.camera.in_(cameras))
     rows: dict[str, list[Any]] = {camera: [] for camera in cameras}
     for row in connection.execute(sa.select(tables.camera_trend).where(*of_cameras).order_by(t.id)):

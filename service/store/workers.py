@@ -1,4 +1,4 @@
-"""The heartbeat of the workers: all SQL about it.
+"""Heartbeats of the workers: all SQL about them.
 
 A worker has a row by its name, and each of its starts a token in it: two workers of one name are told apart by that.
 """
@@ -33,11 +33,11 @@ class WorkerHeartbeat:
     unreadable_jobs: int
 
     def is_alive(self, silence_s: float) -> bool:
-        """Whether it was seen within `silence_s`."""
+        """True if the worker was seen within `silence_s`."""
         return self.silent_s is not None and self.silent_s <= silence_s
 
     def is_silent(self, silence_s: float) -> bool:
-        """Whether it surely was not."""
+        """True if the worker surely was not seen within `silence_s`."""
         return self.silent_s is not None and self.silent_s > silence_s
 
 
@@ -55,9 +55,9 @@ class WorkerStart:
 
 @dataclass(frozen=True)
 class Round:
-    """News of the others that a heartbeat hears: workers that are silent, and open jobs that nothing is heard of.
+    """Answer to a heartbeat: silent workers, and open jobs without a sign of life.
 
-    `is_of_this_start`: whether the row of the worker was still of the start that sent the heartbeat.
+    `is_of_this_start`: True if the row of the worker was still of the start that sent the heartbeat.
     """
 
     is_of_this_start: bool
@@ -84,7 +84,7 @@ class WorkerRepository(Repository):
             connection.execute(sa.insert(workers).values(started_at=now, seen_at=now, **row))
 
     def beat(self, name: str, token: str | None = None, unreadable_jobs: int = 0) -> bool:
-        """A worker is alive; False if the row is no longer of this start: `start_of` says whose it is.
+        """Send the heartbeat of a worker; False if the row is no longer of this start: `start_of` says whose it is.
 
         A sign of life of another one that lies in the future is put to now, so that its silence counts from here on.
         """
@@ -94,7 +94,7 @@ class WorkerRepository(Repository):
     def beat_and_listen(
         self, name: str, token: str | None, silence_s: float, unreadable_jobs: Collection[str] = ()
     ) -> Round:
-        """The same, and what nothing was heard of for `silence_s`, without `unreadable_jobs`, in one transaction."""
+        """Send a heartbeat and return what was silent for `silence_s`, without `unreadable_jobs`; one transaction."""
         with writing(self._engine) as connection:
             now = clock(connection)
             return Round(
@@ -104,23 +104,23 @@ class WorkerRepository(Repository):
             )
 
     def start_of(self, name: str) -> WorkerStart | None:
-        """The start that the row of a worker is of; None: it has none, or the others have given it up."""
+        """Return the start that the row of a worker belongs to; None without a row."""
         with reading(self._engine) as connection:
             row = connection.execute(sa.select(workers).where(w.name == name)).one_or_none()
         return None if row is None else WorkerStart(row.token, row.place, row.seen_at)
 
     def end(self, name: str, token: str) -> None:
-        """A worker ends; its row goes when it has been silent, and with it what it may have left behind."""
+        """Mark a worker as ended; its row is deleted once it has been silent, after its jobs were taken over."""
         with writing(self._engine) as connection:
             connection.execute(sa.update(workers).where(w.name == name, w.token == token).values(place=None))
 
     def alive(self, silence_s: float) -> list[WorkerHeartbeat]:
-        """The workers that were seen within `silence_s`."""
+        """Return the workers that were seen within `silence_s`."""
         with reading(self._engine) as connection:
             return [worker for worker in heartbeats(connection, clock(connection)) if worker.is_alive(silence_s)]
 
     def silent(self, silence_s: float) -> list[str]:
-        """The workers that were not."""
+        """Return the workers that were not seen within `silence_s`."""
         with reading(self._engine) as connection:
             return _silent(connection, clock(connection), silence_s)
 

@@ -1,7 +1,9 @@
 """A database that release 0.2.0 left, opened and served by this version."""
 
+import sqlalchemy as sa
 from obstore.store import from_url
 
+from service.store import tables
 from tests.e2e.running import png, wait_for
 from tests.homes import in_both_homes
 from tests.released import load_dump
@@ -16,11 +18,14 @@ def test_a_database_of_the_last_release_is_served_as_it_was_and_its_waiting_job_
         assert differences(answer, service.http.get(address).raise_for_status().json(), address) == []
     (waiting,) = (job["id"] for job in answers["/jobs"]["jobs"] if job["status"] == "queued")
     store = from_url(home.blob_url(folder))
-    for camera in ("left", "right"):
-        store.put(f"frames/{waiting}/{camera}/0", png())
+    with service.database() as connection:
+        frames = connection.scalar(sa.select(tables.jobs.c.frames).where(tables.jobs.c.id == waiting))
+    for paths in frames.values():
+        store.put(paths[0], png())
     assert service.stop() == 0
     service = start()
-    assert service.end(waiting)["status"] == "succeeded"
+    ended = service.end(waiting)
+    assert (ended["status"], ended["error"]) == ("succeeded", None)
     # The same content under the same key is still the same job, and the venue is calibrated on.
     again = service.submit("waiting", headers={"Idempotency-Key": "waits"})
     assert (again.status_code, again.json()["id"]) == (200, waiting)

@@ -1,1 +1,1 @@
-"""What is told of venues and jobs: the log of events, who follows it, and what is delivered. All SQL about it."""
+"""Events of venues and jobs: the log, its followers, and the outbox of webhooks and callbacks. All SQL about them."""

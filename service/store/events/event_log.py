@@ -1,4 +1,4 @@
-"""What happens to venues, written down where it happens: in the transaction that makes it true.
+"""The event log of venues, written in the transactions that change them.
 
 The numbers of a venue's events are in the order of their transactions, so that who has seen one has seen all before it:
 whoever writes about a venue is serialised about it from the beginning (`venue_lock`).
@@ -35,7 +35,7 @@ def add_event(
     at: datetime,
     by: Actor | None = None,
 ) -> int:
-    """Write down what has happened to a venue, and have its webhooks told; gives the number of the event.
+    """Add an event of a venue and its webhook deliveries; return the number of the event.
 
     `by`: who did it; None: the service by itself.
     """
@@ -51,12 +51,12 @@ def add_job_event(
     at: datetime,
     by: Actor | None = None,
 ) -> None:
-    """The same of a job that has ended, which is read when it is told: it does not change any more."""
+    """Add the event of a job that has ended; its data is read from the job, which does not change any more."""
     _add(connection, venue_id, webhooks, what, at, job=job_id, **columns_of(by))
 
 
 def add_queued_event(connection: sa.Connection, venue: Venue, job: Job, by: Actor | None) -> None:
-    """The same of a job that was submitted, as it is now: when it is told, it may run or have ended."""
+    """Add the event of a submitted job with its data as of now: at the delivery it may run or have ended."""
     data = job.model_dump(mode="json", exclude={"callback"})
     _add(connection, venue.id, venue.webhooks, "job.queued", job.created_at, job=job.id, data=data, **columns_of(by))
 
@@ -64,7 +64,7 @@ def add_queued_event(connection: sa.Connection, venue: Venue, job: Job, by: Acto
 def add_venue_event(
     connection: sa.Connection, venue: Venue, what: str, changed: list[str], by: Actor | None = None
 ) -> None:
-    """The same of what somebody did to a venue."""
+    """Add the event of a change that somebody made to a venue."""
     data = VenueChange(venue=venue.id, changed=changed)
     add_event(connection, venue.id, venue.webhooks, what, data, clock(connection), by)
 

@@ -1,4 +1,4 @@
-"""Following a venue: what has happened to it since somebody looked last."""
+"""Reading the event log: the events of a venue since a number."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ EVENT: TypeAdapter[Event] = TypeAdapter(Event)
 
 @dataclass(frozen=True)
 class NumberedEvent:
-    """An event, and where whoever has seen it goes on."""
+    """An event and its number, from which a follower continues."""
 
     number: int
     event: Event
@@ -35,7 +35,7 @@ class NumberedEvent:
 
 @dataclass(frozen=True)
 class EventPage:
-    """Events in order, up to which number they were looked for, and whether there may be more."""
+    """Events in order, the last number that was searched, and True if there may be more."""
 
     events: list[NumberedEvent]
     up_to: int
@@ -46,15 +46,15 @@ class EventRepository(Repository):
     """The events in the database."""
 
     def newest(self, venue_ids: Collection[str]) -> Mapping[str, int]:
-        """The number of the last event of each of these venues that has had one."""
+        """Return the number of the last event of each of these venues that has one."""
         query = sa.select(e.venue, sa.func.max(e.id).label("newest")).where(e.venue.in_(venue_ids)).group_by(e.venue)
         with reading(self._engine) as connection:
             return {row.venue: row.newest for row in connection.execute(query)}
 
     def beginning(self, venue_id: str, seen: int | None) -> NumberedEvent | None:
-        """The poses that hold, for whoever has seen nothing yet or has missed events that are no longer kept.
+        """Return the poses in use for a follower that is new or has missed expired events, or None if `seen` suffices.
 
-        None: it can be gone on from `seen`. The venue is there.
+        The venue must exist.
         """
         with reading(self._engine) as connection:
             oldest, newest = connection.execute(sa.select(sa.func.min(e.id), sa.func.max(e.id))).one()
@@ -74,16 +74,16 @@ class EventRepository(Repository):
         )
 
     def ends_after(self, venue_id: str, seen: int) -> bool:
-        """Whether a venue was deleted after an event that was seen, and all that came between is kept."""
+        """True if a venue was deleted after event `seen` and no event in between has expired."""
         deleted = sa.exists().where(e.venue == venue_id, e.type == FINAL_EVENT, e.id > seen)
         with reading(self._engine) as connection:
             oldest, is_deleted = connection.execute(sa.select(sa.func.min(e.id), deleted)).one()
             return bool(is_deleted and oldest - 1 <= seen)
 
     def since(self, venue_id: str, seen: int, kinds: Collection[EventKind], limit: int) -> EventPage:
-        """What is of these kinds (none given: of any) among the next `limit` events after one that was seen.
+        """Return the events of these kinds (none given: all) among the next `limit` events after `seen`.
 
-        That the venue was deleted is of every kind: nothing comes after it.
+        The deletion of the venue is of every kind: nothing comes after it.
         """
         query = sa.select(tables.events).where(e.venue == venue_id, e.id > seen).order_by(e.id).limit(limit)
         with reading(self._engine) as connection:
@@ -93,7 +93,7 @@ class EventRepository(Repository):
             return EventPage(_numbered_events(connection, wanted), rows[-1].id if rows else seen, len(rows) == limit)
 
     def get(self, number: int) -> Event | None:
-        """One event as a webhook gets it, without anybody's address; None: it, or its job, is no longer kept."""
+        """Return an event as a webhook gets it, without addresses; None if it or its job has expired."""
         with reading(self._engine) as connection:
             row = connection.execute(sa.select(tables.events).where(e.id == number)).one_or_none()
             told = [] if row is None or row.type not in EVENT_TYPES else _numbered_events(connection, [row])

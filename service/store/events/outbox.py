@@ -32,7 +32,7 @@ d = tables.deliveries.c
 
 @dataclass(frozen=True)
 class Delivery:
-    """An attempt, the first is number 1, to tell `url` of an event, or (None) that the job `id` has ended."""
+    """An attempt (from 1) to deliver an event to `url`, or, where `event` is None, the end of job `id`."""
 
     id: str
     url: str
@@ -47,8 +47,7 @@ class OutboxRepository(Repository):
     def claim_due(
         self, now: datetime, again_at: datetime, limit: int, running: Mapping[str, int] = NOBODY
     ) -> list[Delivery]:
-        """Claim up to `limit` deliveries that are due; they are due again at `again_at` unless they
-        have ended before.
+        """Claim up to `limit` due deliveries; unless they end before, they are due again at `again_at`.
 
         `running`: how many attempts there are already, by receiver.
         """
@@ -105,7 +104,7 @@ class OutboxRepository(Repository):
 
 
 def _due(connection: sa.Connection, now: datetime, limit: int, running: Mapping[str, int]) -> list[sa.Row[Any]]:
-    """Those that have waited longest, without those of receivers that have as many as one may have."""
+    """Return the due deliveries that have waited longest, at most `AT_ONCE_PER_RECEIVER` attempts for each receiver."""
     due, of = sa.select(tables.deliveries).where(d.status == "waiting", d.due_at <= now), Counter(running)
     taken: list[sa.Row[Any]] = []
     while len(taken) < limit:
@@ -129,19 +128,19 @@ def _write(connection: sa.Connection, delivery: Delivery, **values: datetime | s
 
 
 def add_delivery(connection: sa.Connection, job_id: str, url: str, now: datetime) -> None:
-    """Have `url` told that the job has ended, when and if the caller's transaction commits."""
+    """Add the delivery of the end of a job to `url`, inside the caller's transaction."""
     told = {"id": job_id, "url": url, "receiver": _receiver(url), "status": "waiting", "due_at": now}
     connection.execute(sa.insert(tables.deliveries).values(**told))
 
 
 def add_event_delivery(connection: sa.Connection, event: int, url: str, now: datetime) -> None:
-    """Have `url` told of an event, when and if the caller's transaction commits."""
+    """Add the delivery of an event to `url`, inside the caller's transaction."""
     told = {"id": new_id(), "url": url, "receiver": _receiver(url), "status": "waiting", "due_at": now}
     connection.execute(sa.insert(tables.deliveries).values(event=event, **told))
 
 
 def deliveries_of(connection: sa.Connection, job_ids: Collection[str]) -> dict[str, CallbackState]:
-    """How far the telling of the end of jobs has come, of those whose end somebody is to be told."""
+    """Return the state of the callbacks of jobs, for those that have a callback."""
     if not job_ids:
         return {}
     rows = connection.execute(sa.select(tables.deliveries).where(d.id.in_(job_ids)))

@@ -1,4 +1,4 @@
-"""What workers do with jobs: begin an attempt, renew its lease, end it.
+"""Attempts of workers at jobs: begin one, renew its lease, end it.
 
 Every write of a worker carries the fencing token of its attempt (`run_token`) and changes nothing when the job was
 cancelled or given to another attempt meanwhile.
@@ -213,7 +213,7 @@ def _progress_columns(progress: Mapping[str, Progress]) -> dict[str, sa.ColumnEl
 
 
 def _locked(connection: sa.Connection, still: Still) -> bool:
-    """Whether the job still is so, and stays so: a cancellation must come before an end or after it, not within."""
+    """Lock the row of a job; True if conditions hold: a cancellation comes before an end or after it, not within."""
     return connection.scalar(sa.select(j.id).where(*still).with_for_update()) is not None
 
 

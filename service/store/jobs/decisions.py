@@ -1,4 +1,4 @@
-"""What people decide about jobs: that they end, that their poses hold after all, or that they do not."""
+"""Decisions of people about jobs: cancel one, accept its poses after all, or reject them."""
 
 from __future__ import annotations
 
@@ -48,10 +48,10 @@ class VenueHasChanged(Exception):  # noqa: N818
 
 @dataclass(frozen=True)
 class OpenDecisions:
-    """What can still be decided about a calibration.
+    """The decisions about a calibration that are still possible.
 
-    `accept`: the cameras that do not stand as it found them and can be made to; `reject`: whether its poses hold and
-    can be given back; `is_outdated`: whether nothing can be, since the venue was changed.
+    `accept`: the cameras whose stored pose differs from the found one and can be replaced; `reject`: True if its poses
+    are in use and can be undone; `is_outdated`: True if nothing is possible since the venue was changed.
     """
 
     accept: frozenset[str]
@@ -141,7 +141,7 @@ class DecisionRepository(Repository):
 
 
 def _found(connection: sa.Connection, job_id: str) -> tuple[Venue, Result, Revision | None]:
-    """What a calibration began with and what it found, and the revision that its venue is at, which stays."""
+    """Return the input and result of a calibration, and the newest revision of its venue, which is locked."""
     found = found_poses(connection, job_id)
     if found is None:
         raise NoPoses
@@ -151,29 +151,29 @@ def _found(connection: sa.Connection, job_id: str) -> tuple[Venue, Result, Revis
 
 
 def _was_taken(job_id: str, newest: Revision | None) -> bool:
-    """Whether the poses that hold are those of a job."""
+    """True if the poses in use are those of a job."""
     return newest is not None and newest.job == job_id and newest.cause in CALIBRATION_CAUSES
 
 
 def _untouched(now_stored: Venue, began_with: Venue, result: Result, *, taken: bool) -> bool:
-    """Whether nothing but a calibration itself has changed a venue since it began."""
+    """True if nothing but a calibration itself has changed a venue since it began."""
     return (_lies_between if taken else _is_as_it_was)(now_stored, began_with, result)
 
 
 def _not_taken(now_stored: Venue, result: Result) -> frozenset[str]:
-    """The cameras that stand otherwise than a calibration found them."""
+    """Return the cameras whose stored pose or lens differs from the one that a calibration found."""
     found = with_result(now_stored, result)
     pairs = zip(now_stored.cameras, now_stored.poses_and_lenses, found.poses_and_lenses, strict=True)
     return frozenset(camera.id for camera, now, then in pairs if now != then)
 
 
 def _is_as_it_was(now_stored: Venue, began_with: Venue, _: Result) -> bool:
-    """Whether a calibration would begin with the same again."""
+    """True if a calibration would begin with the same input again."""
     return now_stored.has_same_calibration_input_as(began_with)
 
 
 def _lies_between(now_stored: Venue, began_with: Venue, result: Result) -> bool:
-    """Whether each camera stands where a calibration began with it or where it found it, and all else is the same."""
+    """True if each camera has the pose that a calibration began with or found, and all else is unchanged."""
     found = with_result(began_with, result)
     return (
         now_stored.field in (began_with.field, found.field)

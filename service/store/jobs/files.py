@@ -1,4 +1,4 @@
-"""Where the files of jobs lie in the blob store, and what they are called."""
+"""Paths of the files of jobs in the blob store."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ CANDIDATE = "candidate"
 
 
 def frame_folder(job_id: str) -> str:
-    """Where the frames of a job lie."""
+    """Return the folder of the frames of a job."""
     return f"frames/{job_id}"
 
 
 def frame_path(job_id: str, part: str, number: int, sha256: str) -> str:
-    """Where a frame of a camera lies, or a photo; the hash of its bytes is in its name, by which it is known again."""
+    """Return the path of a frame or photo, which ends with the hash of its bytes."""
     return f"{frame_folder(job_id)}/{part}/{number}.{sha256}"
 
 
 def pictures_folder(job_id: str) -> str:
-    """Where the pictures of all attempts of a job lie."""
+    """Return the folder of the pictures of all attempts of a job."""
     return f"pictures/{job_id}"
 
 
 def picture_folder(job_id: str, run_token: str) -> str:
-    """Each attempt has pictures of its own, so that one given up late cannot overwrite those of the next."""
+    """Return the folder of the pictures of an attempt: one given up late cannot overwrite those of the next."""
     return f"{pictures_folder(job_id)}/{run_token}"
 
 
@@ -51,7 +51,7 @@ def names_of_all(cameras: Sequence[str]) -> list[str]:
 
 
 def source_file(folder: str, camera: str) -> str:
-    """What pictures can be drawn of after the frames have gone from their own folder, in the folder of the pictures."""
+    """Return the path of the frame, beside the pictures, from which they are drawn after the frames have expired."""
     return f"{folder}/source/{camera}"
 
 
@@ -73,5 +73,5 @@ def candidate_picture_name(camera: str, number: int) -> str:
 
 
 def picture_file(name: str) -> str:
-    """What the file of a picture is called: `overlay_left.jpg`; layers, which can be seen through, `mask_left.png`."""
+    """Return the file name of a picture: `overlay_left.jpg`, or `mask_left.png` of a transparent layer."""
     return f"{name}.{'png' if name.partition('_')[0] in LAYERS else 'jpg'}"

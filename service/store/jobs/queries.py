@@ -1,4 +1,4 @@
-"""Jobs as clients see them, and what waits for them watches."""
+"""Jobs as clients see them, and their states for long polls and streams."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Pictures:
 
 @dataclass(frozen=True)
 class Drawable:
-    """What a calibration began with and found, and the path of a frame of each camera."""
+    """The input and result of a calibration, and the path of a frame of each camera."""
 
     venue: Venue
     result: Result
@@ -77,7 +77,7 @@ class JobState:
 
 @dataclass(frozen=True)
 class JobPage:
-    """Which jobs a page of them has: up to `limit`, newest first, by whatever filters are not None.
+    """Filters of a page of jobs: up to `limit`, newest first, by the filters that are not None.
 
     `before`: those older than this job. `only`: those of these venues; None: all, also those that belong to no venue.
     """
@@ -126,7 +126,7 @@ class JobRepository(Repository):
                 return None
 
     def several(self, job_ids: Collection[str]) -> dict[str, Job]:
-        """Those of several jobs that are there, by their ids."""
+        """Return those of several jobs that exist, by id."""
         with reading(self._engine) as connection:
             return jobs_of(connection, job_ids)
 
@@ -156,7 +156,7 @@ class JobRepository(Repository):
             return venue_id
 
     def states(self, job_ids: Collection[str]) -> dict[str, JobState]:
-        """What waiters need to know about several jobs."""
+        """Return the states of several jobs, by id."""
         query = sa.select(j.id, j.revision, j.status).where(j.id.in_(job_ids))
         with reading(self._engine) as connection:
             return {row.id: JobState(row.revision, row.status) for row in connection.execute(query)}
@@ -171,7 +171,7 @@ class JobRepository(Repository):
         return Pictures(picture_folder(job_id, row.run_token), row.pictures or [], row.pictures_deleted_at is not None)
 
     def drawable(self, job_id: str) -> Drawable | None:
-        """What pictures of a calibration can be drawn of; None: it has no result, or is no calibration."""
+        """Return what pictures of a calibration are drawn from; None without a result or for other kinds of jobs."""
         with reading(self._engine) as connection:
             found = found_poses(connection, job_id)
             if found is None:
@@ -191,7 +191,7 @@ class JobRepository(Repository):
         return None if found is None else with_result(*found)
 
     def frame(self, job_id: str, number: int) -> str | None:
-        """Where a frame of a job lies in the blob store, counted through all of them; None: there is none."""
+        """Return the path of a frame of a job by its number through all cameras, or None if there is none."""
         query = sa.select(j.frames).where(j.id == job_id, j.frames_deleted_at.is_(None))
         with reading(self._engine) as connection:
             frames = connection.execute(query).scalar_one_or_none() or {}
@@ -217,7 +217,7 @@ def jobs_of(connection: sa.Connection, job_ids: Collection[str]) -> dict[str, Jo
 
 
 def found_poses(connection: sa.Connection, job_id: str) -> tuple[Venue, Result] | None:
-    """What a calibration began with and what it found; None: it found no poses (yet), or the job is no calibration."""
+    """Return the input and result of a calibration; None if it has no result (yet), or the job is no calibration."""
     done = [j.id == job_id, j.kind == "calibration", j.result.is_not(None)]
     query = sa.select(j.id, j.venue_document, j.result)
     row = connection.execute(query.where(*done)).one_or_none()

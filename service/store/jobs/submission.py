@@ -1,4 +1,4 @@
-"""How what a client sent becomes a job, or turns out to be one already."""
+"""Submission: frames and options of a client become a job, or are found to be one already."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ j = tables.jobs.c
 
 
 class Submission(JobInput):
-    """What a client sent, checked: ready to become a job once its frames are stored."""
+    """A checked request for a job, ready to become one once its frames are stored."""
 
     content_hash: str
     idempotency_key: str | None
@@ -82,7 +82,7 @@ class VenueStored(SubmissionRefused):
 
 
 class QueueFull(SubmissionRefused):
-    """As many jobs wait as may."""
+    """Raised while the queue is full."""
 
     def __init__(self, waiting: int, kept: int) -> None:
         """`waiting`: the jobs that wait; `kept`: the places that are kept for schedules that are due."""
@@ -154,7 +154,7 @@ class SubmissionRepository(Repository):
             return read_job(connection, submission.job_id if same is None else same.id)
 
     def waiting(self) -> int:
-        """How many jobs wait."""
+        """Return the number of queued jobs."""
         with reading(self._engine) as connection:
             return _waiting(connection)
 

@@ -1,4 +1,4 @@
-"""What a job is to compute. It travels as JSON to the program that computes it, which sees no database."""
+"""Input of a job. It travels as JSON to the program that computes it, which sees no database."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def stored_options(kind: str, document: Any) -> Handling:
 
 
 def kind_of(options: AnyOptions) -> JobKind:
-    """Which kind of job has such options."""
+    """Return the kind of job that has these options."""
     return next(kind for kind, model in OPTIONS.items() if type(options) is model)
 
 
@@ -70,11 +70,11 @@ class Origin:
 
     @property
     def is_schedule(self) -> bool:
-        """Whether the schedule of a venue asked."""
+        """True if the schedule of a venue submitted the job."""
         return self.asked_by == SCHEDULE
 
     def names(self) -> dict[str, str]:
-        """For every line of the log that comes of it."""
+        """Return the request and trace ids for the lines of the log."""
         trace = self.traceparent.split("-")[1] if self.traceparent else None
         return {name: value for name, value in (("request", self.request_id), ("trace", trace)) if value}
 

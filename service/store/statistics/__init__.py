@@ -1,1 +1,1 @@
-"""What the database counts and sums up for whoever watches the service."""
+"""Statistics in the database: counters, histories and summaries, for pages and /metrics."""

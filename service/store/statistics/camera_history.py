@@ -1,4 +1,4 @@
-"""How the calibrations of each camera of a venue went, one after the other. All SQL about it."""
+"""Calibration history of each camera of a venue. All SQL about it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ q = tables.venue_quality.c
 
 
 class CameraHistory(Schema):
-    """When a camera's pose was accepted last, how often it was not since then, and what its frames were like then.
+    """Calibration history of a camera: its last accepted pose, the rejections since then, and the view at that time.
 
     `accepted_at`: None if never. Calibrations that failed count, dry runs and cancelled ones do not. `view`: of frames
     that could be used.
@@ -37,6 +37,6 @@ def camera_histories(connection: sa.Connection, venue_id: str) -> dict[str, Came
 
 
 def last_accepted_views(connection: sa.Connection, venue_id: str) -> dict[str, View]:
-    """What the frames were like from which each camera's pose was accepted last."""
+    """Return the view conditions of the frames from which each camera's pose was accepted last, by camera."""
     courses = camera_histories(connection, venue_id)
     return {camera: course.view for camera, course in courses.items() if course.view is not None}

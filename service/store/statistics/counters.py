@@ -28,18 +28,18 @@ t = tables.tallies.c
 
 @dataclass(frozen=True)
 class HistogramBuckets:
-    """A histogram among the tallies: how many observations were at most so large, and their sum."""
+    """A histogram among the counters: numbers of observations by upper bound, and their sum."""
 
     metric: str
     bounds: tuple[float, ...]
 
     def of(self, value: float, *labels: str) -> Increments:
-        """What one observation adds."""
+        """Return the increments of one observation."""
         bound = next((f"{bound:g}" for bound in self.bounds if value <= bound), "inf")
         return {(f"{self.metric}_bucket", (*labels, bound)): 1, (f"{self.metric}_sum", labels): value}
 
     def read(self, tallies: Mapping[CounterKey, float], *labels: str) -> tuple[list[tuple[str, float]], float]:
-        """Cumulative counts by upper bound, as Prometheus has them, and the sum.
+        """Return cumulative counts by upper bound, as Prometheus has them, and the sum.
 
         What another release counted under bounds of its own is found below the next of these.
         """
@@ -61,7 +61,7 @@ STITCH_ERROR = HistogramBuckets("job_stitch_error", (0.1, 0.2, 0.3, 0.5, 0.75, 1
 
 
 def add(connection: sa.Connection, amounts: Mapping[CounterKey, float]) -> None:
-    """Count, when and if the caller's transaction commits."""
+    """Add increments to the counters, inside the caller's transaction."""
     if not amounts:
         return
     # The rows in one order, so that no two transactions wait for each other.
@@ -74,20 +74,20 @@ def add(connection: sa.Connection, amounts: Mapping[CounterKey, float]) -> None:
 
 @cache
 def _grow(dialect: str) -> sa.Executable:
-    """The statement that adds to counters, of which one is sent for all rows: those that it returns are not read."""
+    """Return the statement that adds to counters; its RETURNING lets one statement be sent for all rows."""
     insert = INSERT[dialect](tables.tallies)
     grown = {"value": t.value + insert.excluded.value}
     return insert.on_conflict_do_update(index_elements=["metric", "labels"], set_=grown).returning(t.metric)
 
 
 def read(connection: sa.Connection) -> dict[CounterKey, float]:
-    """All of them."""
+    """Return all counters."""
     rows = connection.execute(sa.select(tables.tallies))
     return {(row.metric, tuple(row.labels.split(",")) if row.labels else ()): row.value for row in rows}
 
 
 def total(parts: Iterable[Increments]) -> Increments:
-    """What several observations add."""
+    """Return the sum of increments."""
     amounts: Increments = {}
     for part in parts:
         for key, amount in part.items():

@@ -1,4 +1,4 @@
-"""How a job ended, and what that adds to the tallies."""
+"""Outcomes of jobs, and their increments of the counters."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ VIEW_CONDITIONS = (USABLE, *get_args(Cause))
 
 @dataclass(frozen=True)
 class JobOutcome:
-    """How a job ended, and when it was what."""
+    """The outcome of a job, and the times of its life."""
 
     kind: JobKind
     status: JobStatus
@@ -65,7 +65,7 @@ class JobOutcome:
     attempts: int
 
     def tallies(self) -> Increments:
-        """What it adds."""
+        """Return the increments of the counters."""
         restarts: Increments = {} if self.started_at is None else {(RESTARTS, ()): self.attempts - 1}
         if self.kind != "calibration":
             return total([{(OTHERS_ENDED, (self.kind, self.status)): 1}, restarts, *self._stages()])

@@ -1,4 +1,4 @@
-"""How the calibrations of a venue ended, one after the other: what a page or a chart shows of hundreds of jobs."""
+"""Ended calibrations of a venue, for pages and charts of hundreds of jobs."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class PastCalibration:
 
     @property
     def moved_px(self) -> float | None:
-        """Of the camera that moved most."""
+        """Largest movement of a camera, px."""
         return max((moved.pixels for moved in self.moved.values() if moved.pixels is not None), default=None)
 
 
@@ -51,7 +51,7 @@ class PastCalibrationRepository(Repository):
     """The calibrations in the database that have ended, and which have not."""
 
     def of(self, venue: str, limit: int) -> list[PastCalibration]:
-        """The last `limit` calibrations of a venue that have ended, newest first."""
+        """Return the last `limit` calibrations of a venue that have ended, newest first."""
         query = (
             sa.select(j.id, j.status, j.finished_at, j.result, j.error, j.options)
             .where(j.venue == venue, j.kind == "calibration", j.finished_at.is_not(None))
@@ -63,7 +63,7 @@ class PastCalibrationRepository(Repository):
             return read_each(connection.execute(query), _past)[0]
 
     def newest_result(self, venue: str) -> str | None:
-        """The job of a venue's newest calibration that has a result, accepted or not."""
+        """Return the newest calibration of a venue that has a result, accepted or not."""
         query = (
             sa.select(j.id)
             .where(j.venue == venue, j.kind == "calibration", j.result.is_not(None))
@@ -75,7 +75,7 @@ class PastCalibrationRepository(Repository):
             return connection.scalar(query)
 
     def last_taken(self, venue: str) -> str | None:
-        """The last job whose poses a venue took: of all its jobs, the one whose frames and pictures stay."""
+        """Return the last job whose poses a venue took, whose frames and pictures do not expire."""
         query = (
             sa.select(r.job).where(r.venue == venue, r.cause.in_(CALIBRATION_CAUSES)).order_by(r.number.desc()).limit(1)
         )
@@ -83,7 +83,7 @@ class PastCalibrationRepository(Repository):
             return connection.scalar(query)
 
     def active(self, venues: Collection[str]) -> dict[str, str]:
-        """The calibration that waits or runs now, by venue."""
+        """Return the queued or running calibrations, by venue."""
         query = sa.select(j.venue, j.id).where(
             j.status.in_(OPEN_STATUSES), j.kind == "calibration", j.venue.in_(venues)
         )

@@ -33,7 +33,7 @@ class QueuedJobs:
 
 @dataclass(frozen=True)
 class VenueGauges:
-    """What the last result of a venue said.
+    """Figures of a venue from its last result.
 
     `stitch_error_px` is that of the poses that hold since then: of the new ones if they were accepted, or else of those
     before. `moved_px`: how far the picture of the pitch was found to have moved, at the camera that moved most.
@@ -57,7 +57,7 @@ class ActiveAlarm:
 
 @dataclass(frozen=True)
 class StatisticsSnapshot:
-    """Everything that /metrics shows of the database, at one moment."""
+    """Statistics of the database for /metrics, at one moment."""
 
     queue: Mapping[int, QueuedJobs]
     running: int
@@ -124,13 +124,13 @@ def _venues(connection: sa.Connection, most: int) -> list[VenueGauges]:
 
 
 def _alarms(connection: sa.Connection) -> dict[str, int]:
-    """How many ring, by rule."""
+    """Return the number of active alarms by rule."""
     query = sa.select(a.rule, sa.func.count().label("alarms")).group_by(a.rule)
     return {row.rule: row.alarms for row in connection.execute(query)}
 
 
 def _ringing(connection: sa.Connection, most: int) -> list[ActiveAlarm]:
-    """Those that have rung for longest, whichever the camera."""
+    """Return the alarms that have been active longest, whichever the camera."""
     since = sa.func.min(a.since)
     query = sa.select(a.venue, a.rule).group_by(a.venue, a.rule).order_by(since).limit(most)
     return [ActiveAlarm(row.venue, row.rule) for row in connection.execute(query)]

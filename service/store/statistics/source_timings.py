@@ -1,4 +1,4 @@
-"""How long the sources of cameras take to give a frame, counted over all fetches."""
+"""Histogram of the times that sources of cameras take to give a frame."""
 
 from __future__ import annotations
 

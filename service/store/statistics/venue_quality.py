@@ -1,4 +1,4 @@
-"""What is known of a venue beside its document: read once in a transaction, folded here, and written once.
+"""Quality of a venue from its results: read once in a transaction, folded here, and written once.
 
 Whatever happens to a venue goes through it: a job that ended, poses that hold, a revision that was put back, alarms.
 The caller's transaction is serialised about the venue.
@@ -42,7 +42,7 @@ class QualityRow:
     alarm_due_at: datetime | None = None
 
     def columns(self) -> dict[str, Any]:
-        """The values of the row."""
+        """Return the columns of the row."""
         return {
             "stitch_error_px": self.stitch_error_px,
             "moved_px": self.moved_px,
@@ -70,7 +70,7 @@ class VenueQuality:
         self.knocked: dict[str, str] | None = None
 
     def calibrated(self, result: Result, *, moved: bool) -> None:
-        """A calibration has ended with a result; `moved`: poses of it hold from now on."""
+        """Fold in the result of a calibration; `moved`: some of its poses are in use from now on."""
         shifts = [camera.moved.pixels for camera in result.cameras if camera.moved.pixels is not None]
         self.row.stitch_error_px = result.stitch_error_px if moved else result.stitch_error_before_px
         self.row.moved_px = max(shifts, default=None)
@@ -79,17 +79,17 @@ class VenueQuality:
         }
 
     def missed(self, cameras: Collection[str]) -> None:
-        """A calibration brought no pose for some cameras."""
+        """Fold in that a calibration brought no pose for some cameras."""
         courses = self.row.courses
         courses.update({camera: courses.get(camera, CameraHistory()).missed() for camera in cameras})
 
     def brought_none(self, cameras: Collection[str]) -> None:
-        """A calibration that was to bring poses brought none for any camera."""
+        """Fold in that a calibration brought no pose for any camera."""
         self.missed(cameras)
         self.row.rejected_in_a_row += 1
 
     def hold(self, result: Result, cameras: Collection[str]) -> None:
-        """The poses of some cameras of a result hold from now on."""
+        """Fold in that the poses of some cameras of a result are in use from now on."""
         usable = {camera.id: camera.view for camera in result.cameras if camera.view is not None and camera.view.usable}
         courses = self.row.courses
         for camera in cameras:
@@ -99,7 +99,7 @@ class VenueQuality:
         self.knocked = {camera: why for camera, why in (self.knocked or {}).items() if camera not in cameras}
 
     def ended(self, status: JobStatus, result: AnyResult | None, *, dry_run: bool) -> None:
-        """A calibration has ended, however: for the list of all venues."""
+        """Fold the end of a calibration, whatever it is, into the summary."""
         before = self.row.glance or CalibrationSummary(
             last=CalibrationEnd(status=status, finished_at=self.now, dry_run=dry_run)
         )

@@ -1,4 +1,4 @@
-"""What the list of all venues shows of each: how its last calibration ended, and the curve of those before.
+"""Summary of a venue for the list of all venues: its last calibration and its recent stitch errors.
 
 It is put together when a calibration ends: a list of fifty venues would else read two thousand results.
 """
@@ -25,7 +25,7 @@ a = tables.alarms.c
 
 
 class CalibrationSummary(Schema):
-    """How the last calibration of a venue ended, and recent stitch errors, oldest first, with the gate's limit."""
+    """The end of a venue's last calibration, and recent stitch errors, oldest first, with the gate's limit."""
 
     last: CalibrationEnd
     errors: list[float | None] = Field([])
