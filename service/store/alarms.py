@@ -6,7 +6,7 @@ They are looked at in each transaction that can make one begin or end; that a ti
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from datetime import datetime, timedelta
 from typing import Any, get_args
 
@@ -16,32 +16,27 @@ from service.schemas.health import Alarm, AlarmRule, Alarms, CameraHealth, Venue
 from service.schemas.history import Revision, RevisionCamera
 from service.schemas.venue import Venue
 from service.store import live_alarms, tables
-from service.store.documents import stored_alarm
 from service.store.events.event_log import add_event
 from service.store.events.outbox import add_event_delivery
 from service.store.live_alarms import AlarmKey
 from service.store.revisions import CALIBRATION_CAUSES, newest_known, newest_revision, revision_at
 from service.store.schedules import schedule_of
 from service.store.statistics import counters
-from service.store.statistics.camera_history import CameraHistory, camera_histories
-from service.store.statistics.venue_quality import QualityRow, VenueQuality
+from service.store.statistics.venue_quality import CameraHistory, QualityRow, VenueQuality, read_quality
+from service.store.statistics.venue_summary import active_alarms
 from service.store.trends import trends_of
 
 BEGUN = "alarms_begun"
 MINUTE = "%Y-%m-%d %H:%M"
 a = tables.alarms.c
-q = tables.venue_quality.c
 
 
 def update_alarms(connection: sa.Connection, quality: VenueQuality, venue: Venue) -> None:
     """Begin and end the alarms of a venue, with an event for each, inside the caller's serialised transaction."""
-    rings, due_at = _active_rules(connection, quality, venue)
+    active = alarms_of(connection, venue.id)
+    rings, due_at = _broken_rules(connection, quality, venue, active)
     # Alarms by rules of a newer version are that one's to end.
-    known = {
-        (alarm.rule, alarm.camera or ""): alarm
-        for alarm in alarms_of(connection, venue.id)
-        if alarm.rule in get_args(AlarmRule)
-    }
+    known = {(alarm.rule, alarm.camera or ""): alarm for alarm in active if alarm.rule in get_args(AlarmRule)}
     begun: Counter[counters.CounterKey] = Counter()
     for (rule, camera), why in rings.items():
         if (rule, camera) not in known:
@@ -70,8 +65,7 @@ def _is_covered_by_venue_alarm(key: AlarmKey, rings: Mapping[AlarmKey, str]) -> 
 
 def alarms_of(connection: sa.Connection, venue_id: str) -> list[Alarm]:
     """Return the active alarms of a venue, the oldest first."""
-    query = sa.select(tables.alarms).where(a.venue == venue_id).order_by(a.since, a.rule, a.camera)
-    return [stored_alarm(row) for row in connection.execute(query)]
+    return active_alarms(connection, [venue_id]).get(venue_id, [])
 
 
 def health_of(connection: sa.Connection, venue_id: str) -> VenueHealth | None:
@@ -79,38 +73,37 @@ def health_of(connection: sa.Connection, venue_id: str) -> VenueHealth | None:
     newest = newest_revision(connection, venue_id)
     if newest is None:
         return None
-    quality = connection.execute(sa.select(tables.venue_quality).where(q.venue == venue_id)).one_or_none()
+    quality = read_quality(connection, venue_id) or QualityRow()
     alarms = alarms_of(connection, venue_id)
-    courses = camera_histories(connection, venue_id)
     return VenueHealth(
         state="alarm" if alarms else "ok",
         alarms=alarms,
         revision=newest.revision,
-        cameras=[_camera_health(camera, courses.get(camera.id, CameraHistory())) for camera in newest.cameras],
-        stitch_error_px=quality.stitch_error_px if quality else None,
-        accepted_at=quality.accepted_at if quality else None,
-        rejected_in_a_row=quality.rejected_in_a_row if quality else 0,
+        cameras=[_camera_health(camera, quality.history(camera.id)) for camera in newest.cameras],
+        stitch_error_px=quality.stitch_error_px,
+        accepted_at=quality.accepted_at,
+        rejected_in_a_row=quality.rejected_in_a_row,
         schedule=schedule_of(connection, venue_id),
     )
 
 
-def _camera_health(camera: RevisionCamera, course: CameraHistory) -> CameraHealth:
-    return CameraHealth(**dict(camera), accepted_at=course.accepted_at, rejected_in_a_row=course.rejected_in_a_row)
+def _camera_health(camera: RevisionCamera, history: CameraHistory) -> CameraHealth:
+    return CameraHealth(**dict(camera), accepted_at=history.accepted_at, rejected_in_a_row=history.rejected_in_a_row)
 
 
-def _active_rules(
-    connection: sa.Connection, quality: VenueQuality, venue: Venue
+def _broken_rules(
+    connection: sa.Connection, quality: VenueQuality, venue: Venue, active: Sequence[Alarm]
 ) -> tuple[dict[AlarmKey, str], datetime | None]:
     """Return the rules that are broken now with their reasons, and when time alone breaks the next one."""
     newest = newest_known(connection, quality)
     if venue.alarms is None or newest is None:
         return {}, None
-    known = quality.row
-    courses = {camera.id: known.courses.get(camera.id, CameraHistory()) for camera in newest.cameras}
-    overdue, due_at = _overdue(connection, venue, newest, quality, courses)
-    moved = _moved(venue.alarms, newest) | _drifting(connection, venue) | _knocked(connection, venue, quality, newest)
-    rejected = _rejected(venue.alarms, known, courses)
-    return moved | rejected | overdue | _live(connection, quality, venue), due_at
+    histories = {camera.id: quality.row.history(camera.id) for camera in newest.cameras}
+    overdue, due_at = _overdue(connection, venue, newest, quality, histories)
+    moved = _moved(venue.alarms, newest) | _drifting(connection, venue)
+    knocked = _knocked(active, quality, newest) if venue.alarms.knocked else {}
+    rejected = _rejected(venue.alarms, quality.row.rejected_in_a_row, histories)
+    return moved | knocked | rejected | overdue | _live(connection, quality, venue), due_at
 
 
 def _live(connection: sa.Connection, quality: VenueQuality, venue: Venue) -> dict[AlarmKey, str]:
@@ -130,30 +123,28 @@ def _drifting(connection: sa.Connection, venue: Venue) -> dict[AlarmKey, str]:
     return {("trend", camera): trend.words for camera, trend in trends.items() if trend.state(limit_m) == "alarm"}
 
 
-def _knocked(connection: sa.Connection, venue: Venue, quality: VenueQuality, newest: Revision) -> dict[AlarmKey, str]:
+def _knocked(active: Sequence[Alarm], quality: VenueQuality, newest: Revision) -> dict[AlarmKey, str]:
     """Return the cameras that the last calibration found elsewhere, as long as the poses are those from before it."""
-    if venue.alarms is None or not venue.alarms.knocked:
-        return {}
     if quality.knocked is not None:
         return {("knocked", camera): f"Camera {camera} was {why}." for camera, why in quality.knocked.items()}
     return {
         ("knocked", alarm.camera or ""): alarm.why
-        for alarm in alarms_of(connection, venue.id)
+        for alarm in active
         if alarm.rule == "knocked" and newest.at <= alarm.since
     }
 
 
-def _rejected(rules: Alarms, known: QualityRow, courses: Mapping[str, CameraHistory]) -> dict[AlarmKey, str]:
+def _rejected(rules: Alarms, in_a_row: int, histories: Mapping[str, CameraHistory]) -> dict[AlarmKey, str]:
     limit = rules.rejected_in_a_row
     if limit is None:
         return {}
     rings: dict[AlarmKey, str] = {
         ("rejected-in-a-row", camera): f"The last {count} calibrations brought no pose of camera {camera}."
-        for camera, course in courses.items()
-        if (count := course.rejected_in_a_row) >= limit
+        for camera, history in histories.items()
+        if (count := history.rejected_in_a_row) >= limit
     }
-    if known.rejected_in_a_row >= limit:
-        rings["rejected-in-a-row", ""] = f"The last {known.rejected_in_a_row} calibrations were rejected or failed."
+    if in_a_row >= limit:
+        rings["rejected-in-a-row", ""] = f"The last {in_a_row} calibrations were rejected or failed."
     return rings
 
 
@@ -162,14 +153,14 @@ def _overdue(
     venue: Venue,
     newest: Revision,
     quality: VenueQuality,
-    courses: Mapping[str, CameraHistory],
+    histories: Mapping[str, CameraHistory],
 ) -> tuple[dict[AlarmKey, str], datetime | None]:
     if venue.alarms is None or venue.alarms.not_calibrated_for_h is None:
         return {}, None
     patience = timedelta(hours=venue.alarms.not_calibrated_for_h)
     now, last = quality.now, quality.row.accepted_at or revision_at(connection, venue.id, 1)
     since = {
-        camera.id: courses[camera.id].accepted_at or revision_at(connection, venue.id, camera.drift_since)
+        camera.id: histories[camera.id].accepted_at or revision_at(connection, venue.id, camera.drift_since)
         for camera in newest.cameras
     }
     rings: dict[AlarmKey, str] = {

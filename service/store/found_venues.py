@@ -1,4 +1,4 @@
-"""Adoption of cameras that a job found from their frames, by a person.
+"""Venues of cameras that were found from their frames, which a person lets hold.
 
 A job that looks for cameras stores nothing. What it found is taken by hand: the venue is created, or cameras of the one
 that is there are put where they were found.
@@ -46,7 +46,7 @@ class FoundVenueRepository(Repository):
     """The cameras that jobs in the database have found."""
 
     def is_adoptable(self, job_id: str) -> bool:
-        """True if the venue is as the job began with it, or not yet stored, so that `adopt` would take it."""
+        """Whether `adopt` would find the venue as the job began with it, or not yet there."""
         with reading(self._engine) as connection:
             found = found_site(connection, job_id)
             if found is None:
@@ -94,7 +94,7 @@ class FoundVenueRepository(Repository):
 
 
 def _require_candidates(found: FoundSite, choice: Mapping[str, int | None]) -> None:
-    """Raise for a choice that names what does not exist, or leaves open what a new venue needs."""
+    """Raise where the choice names what there is not, or leaves open what a new venue needs."""
     counts = {camera.id: len(camera.candidates) for camera in found.result.cameras}
     for camera, number in choice.items():
         if camera not in counts or (number is not None and number > counts[camera]):
@@ -105,7 +105,7 @@ def _require_candidates(found: FoundSite, choice: Mapping[str, int | None]) -> N
 
 
 def _wanted(before: Venue | None, found: FoundSite, choice: Mapping[str, int | None]) -> Venue:
-    """Return the new venue, or the stored one with the chosen cameras where they were found."""
+    """The new venue, or the one that is there with the chosen cameras where they were found."""
     try:
         placed = found.venue(choice)
     except ValidationError as error:
@@ -126,7 +126,7 @@ def _wanted(before: Venue | None, found: FoundSite, choice: Mapping[str, int | N
 
 
 def _is_untouched(now_stored: Venue, began_with: Venue, cameras: Sequence[str]) -> bool:
-    """True if the field and these cameras are as a job began with them, wherever the others have moved since."""
+    """Whether the field and these cameras are as a job began with them, wherever the others have moved since."""
     stand, stood = ({one.id: one for one in venue.poses_and_lenses} for venue in (now_stored, began_with))
     return now_stored.field == began_with.field and all(
         camera in stand and stand[camera] == stood[camera] for camera in cameras

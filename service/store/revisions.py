@@ -10,7 +10,6 @@ from collections.abc import Collection, Iterator, Sequence
 from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass
 from datetime import datetime
-from types import SimpleNamespace
 from typing import Any, get_args
 
 import sqlalchemy as sa
@@ -96,8 +95,8 @@ def add_revision(
         "movements": {camera: movement.model_dump() for camera, movement in movements.items()},
         **columns_of(by),
     }
-    connection.execute(sa.insert(tables.revisions).values(**row))
-    quality.newest_revision = SimpleNamespace(**row)
+    inserted = sa.insert(tables.revisions).values(**row).returning(tables.revisions)
+    quality.newest_revision = connection.execute(inserted).one()
     changed = _changed(venue, last)
     if restored is not None:
         go_back(connection, venue, restored.revision)
@@ -329,7 +328,7 @@ def _newest_row_by(connection: sa.Connection, quality: VenueQuality) -> Any:
     return quality.newest_revision
 
 
-def _newest_row(connection: sa.Connection, venue_id: str) -> Any:
+def _newest_row(connection: sa.Connection, venue_id: str | None) -> Any:
     query = sa.select(tables.revisions).where(r.venue == venue_id).order_by(r.number.desc()).limit(1)
     return connection.execute(query).one_or_none()
 

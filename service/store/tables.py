@@ -228,7 +228,7 @@ venue_quality = sa.Table(
     sa.Column("drift_px", sa.Double),
     # Calibrations since then that brought no pose for any camera; dry runs do not count.
     sa.Column("rejected_in_a_row", sa.Integer, nullable=False, server_default="0"),
-    # statistics.camera_history.CameraHistory by camera.
+    # statistics.venue_quality.CameraHistory by camera.
     sa.Column("cameras", sa.JSON(none_as_null=True)),
     # statistics.venue_summary.CalibrationSummary; null: it was never calibrated.
     sa.Column("glance", sa.JSON(none_as_null=True)),

@@ -75,19 +75,17 @@ def anchors_of(connection: sa.Connection, venue_id: str) -> dict[str, Anchor]:
 
 def trends_of(connection: sa.Connection, venue_id: str) -> dict[str, CameraTrend]:
     """Return the newest trends of a venue, by camera, inside the caller's transaction."""
-    return {
-        camera: CameraTrend(venue_id, camera, row.beyond, row.moved_m, row.cusum, row.words)
-        for camera, row in _newest_anchors(connection, venue_id).items()
-    }
+    return {camera: _trend_in(row) for camera, row in _newest_anchors(connection, venue_id).items()}
 
 
 def most_moved(connection: sa.Connection, most: int) -> list[CameraTrend]:
     """Return the trends of the cameras that have moved farthest, inside the caller's transaction."""
     query = sa.select(tables.camera_anchors).where(c.moved_m.is_not(None)).order_by(c.moved_m.desc()).limit(most)
-    return [
-        CameraTrend(row.venue, row.camera, row.beyond, row.moved_m, row.cusum, row.words)
-        for row in connection.execute(query)
-    ]
+    return [_trend_in(row) for row in connection.execute(query)]
+
+
+def _trend_in(row: Any) -> CameraTrend:
+    return CameraTrend(row.venue, row.camera, row.beyond, row.moved_m, row.cusum, row.words)
 
 
 def begin_anchors(connection: sa.Connection, venue: Venue, changed: Collection[str], revision: int) -> None:
@@ -165,25 +163,19 @@ def _add_anchor(connection: sa.Connection, venue_id: str, camera: str, revision:
     key = {"venue": venue_id, "camera": camera, "revision": revision}
     those_before = sa.update(tables.camera_anchors).where(c.venue == venue_id, c.camera == camera)
     connection.execute(those_before.values(moved_m=None))
-    connection.execute(sa.insert(tables.camera_anchors).values(**key, **_nothing_said(camera)))
+    connection.execute(sa.insert(tables.camera_anchors).values(**key, **_empty_columns(camera)))
 
 
-def _nothing_said(camera: str) -> dict[str, Any]:
+def _empty_columns(camera: str) -> dict[str, Any]:
     """Return the columns of an anchor without an accepted pose."""
-    nothing: dict[str, Any] = {
-        "at": None,
-        "posed": None,
-        "baselines": {},
-        "beyond": False,
-        "moved_m": None,
-        "cusum": None,
-    }
-    return {**nothing, "words": f"Camera {camera} has had no pose accepted since it was put."}
+    words = f"Camera {camera} has had no pose accepted since it was put."
+    return dict.fromkeys(("at", "posed", "moved_m", "cusum")) | {"baselines": {}, "beyond": False, "words": words}
 
 
 def _set_anchor(connection: sa.Connection, venue_id: str, camera: PosedCamera, revision: int, at: datetime) -> None:
-    posed = {"at": at, "posed": to_document(camera)}
-    connection.execute(sa.update(tables.camera_anchors).where(*_is(venue_id, camera.id, revision)).values(**posed))
+    is_anchor = (c.venue == venue_id, c.camera == camera.id, c.revision == revision)
+    anchor = sa.update(tables.camera_anchors).where(*is_anchor)
+    connection.execute(anchor.values(at=at, posed=to_document(camera)))
 
 
 def _row(result: CameraResult, moved: Displacement, anchor: int) -> dict[str, Any]:
@@ -215,23 +207,23 @@ def _chart(
     if not charted:
         return
     rows = _rows(connection, venue_id, charted)
-    said: list[dict[str, Any]] = []
-    without_a_night: list[dict[str, Any]] = []
+    with_nights: list[dict[str, Any]] = []
+    without_nights: list[dict[str, Any]] = []
     for camera in charted:
         _trim(connection, rows[camera])
         anchor = anchors[camera]
         of_anchor = {"of_camera": camera, "of_revision": anchor.revision}
         since = [row for row in rows[camera] if row.anchor == anchor.revision]
         if since:
-            said.append(of_anchor | _said(camera, since, anchor))
+            with_nights.append(of_anchor | _chart_columns(camera, since, anchor))
         else:
-            without_a_night.append(of_anchor | _nothing_said(camera))
+            without_nights.append(of_anchor | _empty_columns(camera))
     is_anchor = (c.venue == venue_id, c.camera == sa.bindparam("of_camera"), c.revision == sa.bindparam("of_revision"))
-    for values in filter(None, (said, without_a_night)):
+    for values in filter(None, (with_nights, without_nights)):
         connection.execute(sa.update(tables.camera_anchors).where(*is_anchor), values)
 
 
-def _said(camera: str, since: Sequence[Any], anchor: Any) -> dict[str, Any]:
+def _chart_columns(camera: str, since: Sequence[Any], anchor: Any) -> dict[str, Any]:
     """Return the chart columns of an anchor, by the rows since it."""
     charts = CameraCharts.of(since, _baselines(anchor))
     last = len(charts.nights) - 1
@@ -266,7 +258,7 @@ def _trend(venue: Venue, camera: str, anchor: Any, rows: Sequence[Any], since: d
         anchor=None,
         since=None,
         state="too-few-nights",
-        words=_nothing_said(camera)["words"],
+        words=_empty_columns(camera)["words"],
         alarm_m=alarm_m,
         moved_m=0.0,
         baseline_nights=0,
@@ -290,7 +282,3 @@ def _rows(connection: sa.Connection, venue_id: str, cameras: Collection[str]) ->
 def _newest_anchors(connection: sa.Connection, venue_id: str) -> dict[str, Any]:
     query = sa.select(tables.camera_anchors).where(c.venue == venue_id).order_by(c.revision)
     return {row.camera: row for row in connection.execute(query)}
-
-
-def _is(venue_id: str, camera: str, revision: int) -> list[sa.ColumnElement[bool]]:
-    return [c.venue == venue_id, c.camera == camera, c.revision == revision]

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import uuid
 from collections.abc import Callable, Collection, Mapping, Sequence
-from contextlib import nullcontext
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
@@ -29,8 +28,7 @@ from service.store.jobs.queries import ONE, job_input_values
 from service.store.jobs.task import Task, UnreadableJob, parse_job_input
 from service.store.memories import Memories, newest_memories
 from service.store.silence import unheard_for
-from service.store.statistics.camera_history import last_accepted_views
-from service.store.statistics.venue_quality import VenueQuality, update_quality
+from service.store.statistics.venue_quality import VenueQuality, last_accepted_views, update_quality
 from service.store.trends import anchors_of
 from service.store.venues import apply_result, find_readable, find_stored, venue_lock
 
@@ -57,7 +55,7 @@ class AttemptRepository(Repository):
         try:
             return self._begin(job_id)
         except UnreadableJob:
-            self._let_wait(job_id)
+            self._requeue(job_id)
             raise
 
     def _begin(self, job_id: str) -> Task | None:
@@ -92,12 +90,12 @@ class AttemptRepository(Repository):
             }
             return parse_job_input(Task, job | attempt)
 
-    def _let_wait(self, job_id: str) -> None:
-        """Let a job wait whose earlier attempt, by a worker that could read it, is over."""
+    def _requeue(self, job_id: str) -> None:
+        """Put a job back into the queue after an attempt of a worker that could read it."""
         with writing(self._engine) as connection:
-            waits = {"status": "queued", "run_token": None, "progress": None, **changed(clock(connection))}
-            begun = [j.id == job_id, j.status == "running"]
-            connection.execute(sa.update(tables.jobs).where(*begun).values(**waits))
+            queued = {"status": "queued", "run_token": None, "progress": None, **changed(clock(connection))}
+            is_running = [j.id == job_id, j.status == "running"]
+            connection.execute(sa.update(tables.jobs).where(*is_running).values(**queued))
 
     def reclaim(self, job_id: str, seconds: float) -> StrandedJob | None:
         """Reserve a job that has waited unchanged for so long, to put it into the queue again.
@@ -114,10 +112,10 @@ class AttemptRepository(Repository):
             parse_job_input(Task, job_input_values(row) | {"run_token": ""})
             return StrandedJob(row.priority, row.kind)
 
-    def enqueue(self, job_id: str, left: StrandedJob, enqueue: Enqueue) -> None:
+    def enqueue(self, job_id: str, job: StrandedJob, enqueue: Enqueue) -> None:
         """Put a job that was taken back into the queue."""
         with writing(self._engine) as connection:
-            enqueue(connection, job_id, left.priority, left.kind)
+            enqueue(connection, job_id, job.priority, job.kind)
 
     def still_waiting(self, job_ids: Collection[str]) -> set[str]:
         """Return which of several jobs are waiting."""
@@ -140,8 +138,7 @@ class AttemptRepository(Repository):
             alive = sa.update(tables.jobs).where(*_fences(written)).values(updated_at=clock(connection))
             if progress:
                 alive = alive.values(_progress_columns(progress))
-            held = set(connection.scalars(alive.returning(j.run_token)))
-            return held | _holders(connection, rest)
+            return set(connection.scalars(alive.returning(j.run_token))) | _holders(connection, rest)
 
     def finish(self, task: Task, result: AnyResult, pictures: Sequence[str], memories: Memories = NO_MEMORIES) -> None:
         """End a job with a result and the names of its pictures.
@@ -154,8 +151,8 @@ class AttemptRepository(Repository):
                 advisory_lock(connection, venue_lock(task.venue_id))
             if not _locked(connection, _fence(task)):
                 return
-            with nullcontext() if task.venue_id is None else update_quality(connection, task.venue_id) as quality:
-                if isinstance(result, Result) and quality is not None:
+            with update_quality(connection, task.venue_id) as quality:
+                if isinstance(result, Result):
                     result = _move_poses(connection, quality, task, result, memories)
                 end_job(
                     connection,
@@ -220,10 +217,9 @@ def _locked(connection: sa.Connection, still: Still) -> bool:
 def _move_poses(
     connection: sa.Connection, quality: VenueQuality, task: Task, result: Result, memories: Memories
 ) -> Result:
-    """Let the poses hold that are accepted with the memories of their cameras, and note what the result says about the
-    venue.
+    """Store the accepted poses and the memories of their cameras, and fold the result into the venue's quality.
 
-    Gives the result with what the venue has to say about that.
+    Return the result, which is refused where the venue was changed meanwhile.
     """
     assert task.venue is not None
     assert isinstance(task.options, Options)
@@ -232,14 +228,14 @@ def _move_poses(
         if not result.accepted_cameras:
             return result
         return result.refused("the venue was changed while the job ran", "venue-changed")
-    held = [] if task.options.dry_run else result.accepted_cameras
-    quality.calibrated(result, moved=bool(held))
-    if held:
-        quality.missed(stored.venue.poses.keys() - held)
-        with_this_job = {camera: memory for camera, memory in memories.items() if camera in held}
+    accepted = [] if task.options.dry_run else result.accepted_cameras
+    quality.calibrated(result, moved=bool(accepted))
+    if accepted:
+        quality.missed(stored.venue.poses.keys() - accepted)
+        with_this_job = {camera: memory for camera, memory in memories.items() if camera in accepted}
         known = {**newest_memories(connection, task.venue.id), **with_this_job}
         cause: Cause = "recovered" if result.recovered_cameras else "calibrated"
-        apply_result(connection, quality, stored, result, held, cause, task.job_id, known, task.origin.actor)
+        apply_result(connection, quality, stored, result, accepted, cause, task.job_id, known, task.origin.actor)
     elif not task.options.dry_run:
         _miss(connection, quality, stored.venue)
     return result
@@ -248,20 +244,20 @@ def _move_poses(
 def end_without_result(connection: sa.Connection, job_id: str, still: Still, error: JobError) -> bool:
     """Fail a job inside the caller's transaction; False, and nothing is done, if the row is not `still` so."""
     row = connection.execute(sa.select(j.kind, j.venue, j.options).where(j.id == job_id)).one()
-    brought_none = row.kind == "calibration" and not row.options["dry_run"]
+    misses = row.kind == "calibration" and not row.options["dry_run"]
     if row.venue is not None:
         advisory_lock(connection, venue_lock(row.venue))
     if not _locked(connection, still):
         return False
-    venue = find_readable(connection, row.venue) if brought_none else None
-    with nullcontext() if row.venue is None else update_quality(connection, row.venue) as quality:
-        if venue is not None and quality is not None:
+    venue = find_readable(connection, row.venue) if misses else None
+    with update_quality(connection, row.venue) as quality:
+        if venue is not None:
             # Alarms are counted before ends wherever both are, so that no two transactions wait for each other.
             _miss(connection, quality, venue)
         return end_job(connection, job_id, still, "failed", quality, error=error)
 
 
 def _miss(connection: sa.Connection, quality: VenueQuality, venue: Venue) -> None:
-    """A calibration that was to bring poses brought none."""
+    """Fold in a calibration that was to bring poses and brought none."""
     quality.brought_none(venue.poses.keys())
     update_alarms(connection, quality, venue)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from contextlib import nullcontext
 from dataclasses import dataclass
 
 import sqlalchemy as sa
@@ -84,7 +83,7 @@ class DecisionRepository(Repository):
             venue_id = connection.scalar(sa.select(j.venue).where(j.id == job_id))
             if venue_id is not None:
                 advisory_lock(connection, venue_lock(venue_id))
-            with nullcontext() if venue_id is None else update_quality(connection, venue_id) as quality:
+            with update_quality(connection, venue_id) as quality:
                 end_job(connection, job_id, still_open(job_id), "cancelled", quality, by=by)
 
     def accept(self, job_id: str, cameras: Collection[str] | None = None, by: Actor | None = None) -> None:

@@ -19,7 +19,6 @@ from service.schemas.names import OPEN_STATUSES, JobStatus
 from service.schemas.options import Options
 from service.schemas.results import AnyResult
 from service.store import tables
-from service.store.database import clock
 from service.store.documents import to_document
 from service.store.events.event_log import add_job_event
 from service.store.events.outbox import add_delivery
@@ -40,7 +39,7 @@ def end_job(
     job_id: str,
     still: Still,
     status: JobStatus,
-    quality: VenueQuality | None,
+    quality: VenueQuality,
     *,
     result: AnyResult | None = None,
     error: JobError | None = None,
@@ -49,9 +48,9 @@ def end_job(
 ) -> bool:
     """End a job with its event, callback and counters; False, and nothing is done, if the row is not `still` so.
 
-    `quality`: that of its venue; None: it has no venue. `by`: who ended it; None: it ended by itself.
+    `quality`: that of its venue. `by`: who ended it; None: it ended by itself.
     """
-    now = clock(connection) if quality is None else quality.now
+    now = quality.now
     if result is not None:
         values["result"] = to_document(result)
     if error is not None:
@@ -64,7 +63,7 @@ def end_job(
     if row is None:
         return False
     options = stored_options(row.kind, row.options)
-    if isinstance(options, Options) and quality is not None:
+    if isinstance(options, Options):
         quality.ended(status, result, dry_run=options.dry_run)
     if row.venue is not None:
         nobody: list[Webhook] = []

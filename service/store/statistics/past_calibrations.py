@@ -52,25 +52,14 @@ class PastCalibrationRepository(Repository):
 
     def of(self, venue: str, limit: int) -> list[PastCalibration]:
         """Return the last `limit` calibrations of a venue that have ended, newest first."""
-        query = (
-            sa.select(j.id, j.status, j.finished_at, j.result, j.error, j.options)
-            .where(j.venue == venue, j.kind == "calibration", j.finished_at.is_not(None))
-            .with_hint(*tables.BY_VENUE)
-            .order_by(j.id.desc())
-            .limit(limit)
-        )
+        columns = (j.id, j.status, j.finished_at, j.result, j.error, j.options)
+        query = _newest_calibrations(venue, *columns).where(j.finished_at.is_not(None)).limit(limit)
         with reading(self._engine) as connection:
             return read_each(connection.execute(query), _past)[0]
 
     def newest_result(self, venue: str) -> str | None:
         """Return the newest calibration of a venue that has a result, accepted or not."""
-        query = (
-            sa.select(j.id)
-            .where(j.venue == venue, j.kind == "calibration", j.result.is_not(None))
-            .with_hint(*tables.BY_VENUE)
-            .order_by(j.id.desc())
-            .limit(1)
-        )
+        query = _newest_calibrations(venue, j.id).where(j.result.is_not(None)).limit(1)
         with reading(self._engine) as connection:
             return connection.scalar(query)
 
@@ -100,6 +89,11 @@ class PastCalibrationRepository(Repository):
         )
         with reading(self._engine) as connection:
             return {row.venue: (row.cause, row.at) for row in connection.execute(query)}
+
+
+def _newest_calibrations(venue: str, *columns: Any) -> sa.Select[Any]:
+    calibrations = sa.select(*columns).where(j.venue == venue, j.kind == "calibration")
+    return calibrations.with_hint(*tables.BY_VENUE).order_by(j.id.desc())
 
 
 def _past(row: Any) -> PastCalibration:

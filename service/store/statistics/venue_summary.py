@@ -52,9 +52,14 @@ class VenueSummaryRepository(Repository):
 
     def alarms(self, venues: Collection[str]) -> dict[str, list[Alarm]]:
         """Return the active alarms of venues, the oldest first, by venue."""
-        query = sa.select(tables.alarms).where(a.venue.in_(venues)).order_by(a.since, a.rule, a.camera)
-        ringing: dict[str, list[Alarm]] = {}
         with reading(self._engine) as connection:
-            for row in connection.execute(query):
-                ringing.setdefault(row.venue, []).append(stored_alarm(row))
-        return ringing
+            return active_alarms(connection, venues)
+
+
+def active_alarms(connection: sa.Connection, venues: Collection[str]) -> dict[str, list[Alarm]]:
+    """Return the active alarms of venues, the oldest first, by venue, inside the caller's transaction."""
+    query = sa.select(tables.alarms).where(a.venue.in_(venues)).order_by(a.since, a.rule, a.camera)
+    alarms: dict[str, list[Alarm]] = {}
+    for row in connection.execute(query):
+        alarms.setdefault(row.venue, []).append(stored_alarm(row))
+    return alarms
