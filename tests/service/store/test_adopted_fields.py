@@ -1,4 +1,4 @@
-"""Numbers of the field that results offer: to whom they belong, how they are stored and undone, in both homes."""
+"""Numbers of the field that results offer: to whom they belong, how they are stored and undone."""
 
 import numpy as np
 import pytest
@@ -67,7 +67,6 @@ def test_a_ridge_is_stored_as_a_revision_of_its_own_and_moves_no_camera(stock):
     assert changes == [["field"]]
 
 
-@in_both_homes
 def test_memories_and_trends_end_with_it_as_with_any_other_field_that_is_put(stock):
     stock.venue("v")
     job = night(stock, RIDGE)
@@ -80,7 +79,6 @@ def test_memories_and_trends_end_with_it_as_with_any_other_field_that_is_put(sto
     assert stock.refined.of_venue(stock.venues.get("v")) == {}
 
 
-@in_both_homes
 def test_to_store_it_again_changes_nothing(stock):
     stock.venue("v")
     job = night(stock, RIDGE)
@@ -89,7 +87,6 @@ def test_to_store_it_again_changes_nothing(stock):
     assert offered(stock, job) == []
 
 
-@in_both_homes
 def test_a_ridge_and_a_length_of_one_job_are_stored_one_after_the_other_in_any_order(stock):
     stock.venue("v")
     job = night(stock, RIDGE, LENGTH)
@@ -119,7 +116,6 @@ def test_restoring_the_revision_before_takes_a_length_back_and_the_one_after_bri
     assert stock.venues.restorable(stock.venues.get("v"), [1, 2, 3, 4, 5]) == {1, 2, 3, 4, 5}
 
 
-@in_both_homes
 def test_a_length_that_somebody_has_put_since_is_not_taken_back(stock):
     venue = stock.venue("v")
     adopted(stock, night(stock, LENGTH), "length_m")
@@ -129,7 +125,6 @@ def test_a_length_that_somebody_has_put_since_is_not_taken_back(stock):
     assert length(stock) == 104.7
 
 
-@in_both_homes
 def test_nothing_is_stored_of_a_job_whose_poses_do_not_hold(stock):
     stock.venue("v")
     rejected, dry = night(stock, RIDGE, accepted=False), night(stock, RIDGE, dry_run=True)
@@ -147,7 +142,6 @@ def test_nothing_is_stored_of_a_job_whose_poses_do_not_hold(stock):
     assert stock.venues.get("v").field.ridge is None
 
 
-@in_both_homes
 def test_poses_that_a_person_accepted_or_restored_hold_too_and_so_do_refined_ones(stock):
     stock.venue("v")
     by_hand = night(stock, RIDGE, accepted=False)
@@ -162,7 +156,6 @@ def test_poses_that_a_person_accepted_or_restored_hold_too_and_so_do_refined_one
     assert adopted(stock, last).ridge == HIPPED
 
 
-@in_both_homes
 def test_on_a_field_that_was_put_since_nothing_is_offered(stock):
     venue = stock.venue("v")
     job = night(stock, RIDGE)
@@ -173,7 +166,6 @@ def test_on_a_field_that_was_put_since_nothing_is_offered(stock):
         adopted(stock, job)
 
 
-@in_both_homes
 def test_a_number_that_the_sport_does_not_allow_is_refused_with_its_limits(stock):
     stock.venue("v")
     job = night(stock, ("length_m", 105.0, 131.5), ("ridge_height_m", 0.0, -0.1))
@@ -187,7 +179,6 @@ def test_a_number_that_the_sport_does_not_allow_is_refused_with_its_limits(stock
     assert newest(stock).revision == 2
 
 
-@in_both_homes
 def test_what_a_job_does_not_offer_and_jobs_of_other_venues_are_refused(stock):
     stock.venue("v")
     stock.venue("w")
@@ -200,7 +191,6 @@ def test_what_a_job_does_not_offer_and_jobs_of_other_venues_are_refused(stock):
         assert offered(stock, job) == []
 
 
-@in_both_homes
 def test_a_calibration_that_runs_meanwhile_is_rejected(stock):
     stock.venue("v")
     job = night(stock, RIDGE)

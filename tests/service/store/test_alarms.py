@@ -1,4 +1,4 @@
-"""Alarms of venues: each begins once and is over once, in both homes."""
+"""Alarms of venues: each begins once and is over once."""
 
 from service.schemas.health import Alarms as Rules
 from service.schemas.job import JobError
@@ -29,7 +29,6 @@ def failed(stock, **options):
     stock.attempts.fail(task, ERROR)
 
 
-@in_both_homes
 def test_a_venue_without_rules_is_ok_whatever_happens(stock):
     stock.venue("v")
     for _ in range(3):
@@ -39,7 +38,6 @@ def test_a_venue_without_rules_is_ok_whatever_happens(stock):
     assert stock.venues.health("nowhere") is None
 
 
-@in_both_homes
 def test_rejections_in_a_row_ring_once_and_an_accepted_calibration_ends_it(stock):
     watched(stock, rejected_in_a_row=3)
     stock.calibrated("v", accepted=False)
@@ -57,7 +55,6 @@ def test_rejections_in_a_row_ring_once_and_an_accepted_calibration_ends_it(stock
     assert told(stock) == [("rejected-in-a-row", "began"), ("rejected-in-a-row", "ended")]
 
 
-@in_both_homes
 def test_taking_a_rejected_result_by_hand_ends_the_row(stock):
     watched(stock, rejected_in_a_row=1)
     job = stock.calibrated("v", accepted=False)
@@ -66,7 +63,6 @@ def test_taking_a_rejected_result_by_hand_ends_the_row(stock):
     assert rings(stock) == []
 
 
-@in_both_homes
 def test_a_camera_that_moved_far_rings_until_it_moves_less(stock):
     watched(stock, moved_since_last_px=0.001)
     stock.calibrated("v")
@@ -79,7 +75,6 @@ def test_a_camera_that_moved_far_rings_until_it_moves_less(stock):
     assert told(stock) == [("moved-since-last", "began")] * 2 + [("moved-since-last", "ended")] * 2
 
 
-@in_both_homes
 def test_drift_adds_up_until_it_rings_and_restoring_ends_it(stock):
     stock.venue("v")
     stock.calibrated("v")
@@ -111,7 +106,6 @@ def test_what_was_not_calibrated_for_long_rings_without_anything_happening(stock
     assert told(stock)[2:] == [("not-calibrated", "began")]
 
 
-@in_both_homes
 def test_the_alarm_of_a_camera_goes_on_while_the_venues_rings_and_the_camera_is_no_better(stock):
     watched(stock, rejected_in_a_row=2)
     for _ in range(2):
@@ -128,7 +122,6 @@ def test_the_alarm_of_a_camera_goes_on_while_the_venues_rings_and_the_camera_is_
     assert told(stock)[2:] == [("rejected-in-a-row", "ended")] * 2
 
 
-@in_both_homes
 def test_an_alarm_names_the_setting_that_it_goes_by(stock):
     watched(stock, rejected_in_a_row=1)
     stock.calibrated("v", accepted=False)
@@ -137,7 +130,6 @@ def test_an_alarm_names_the_setting_that_it_goes_by(stock):
     assert stock.alarms_told()[0].data.setting == "rejected_in_a_row"
 
 
-@in_both_homes
 def test_a_rule_that_is_taken_away_ends_its_alarm(stock):
     watched(stock, rejected_in_a_row=1)
     stock.calibrated("v", accepted=False)

@@ -1,4 +1,4 @@
-"""What can still be decided about a calibration is what is then not refused, in both homes."""
+"""What can still be decided about a calibration is what is then not refused."""
 
 import pytest
 
@@ -20,7 +20,6 @@ def test_poses_that_hold_can_be_rejected_and_then_accepted(stock):
     assert stock.decisions.decidable(job) == OpenDecisions(frozenset(), reject=True)
 
 
-@in_both_homes
 def test_of_a_result_that_was_accepted_in_part_the_other_cameras_can_be_accepted(stock):
     stock.venue("v")
     job = stock.calibrated("v", accepted=["left"])
@@ -29,7 +28,6 @@ def test_of_a_result_that_was_accepted_in_part_the_other_cameras_can_be_accepted
     assert stock.decisions.decidable(job) == OpenDecisions(frozenset(), reject=True)
 
 
-@in_both_homes
 def test_nothing_can_be_decided_about_a_venue_that_somebody_changed_since(stock):
     stock.venue("v")
     job = stock.calibrated("v", accepted=["left"])
@@ -40,7 +38,6 @@ def test_nothing_can_be_decided_about_a_venue_that_somebody_changed_since(stock)
             decide(job)
 
 
-@in_both_homes
 def test_nothing_can_be_decided_about_a_job_without_poses_or_without_its_venue(stock):
     stock.venue("v")
     waiting = stock.submitted("v")

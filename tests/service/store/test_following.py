@@ -47,7 +47,6 @@ def test_everything_that_happens_to_a_venue_is_an_event_in_its_order(stock):
     assert told(stock, "other") == []
 
 
-@in_both_homes
 def test_new_poses_come_with_everything_that_draws_on_a_picture(stock):
     stock.calibrated("v", accepted=["right"])
     (event,) = (one.event for one in stock.events.since("v", 0, ["poses.changed"], 100).events[1:])
@@ -96,7 +95,6 @@ def test_no_number_is_given_twice_on_sqlite(tmp_path):
     stock.engine.dispose()
 
 
-@in_both_homes
 def test_that_a_job_was_submitted_is_told_as_it_was_submitted_whatever_became_of_it(stock):
     job = stock.calibrated("v")
     (queued,) = stock.events.since("v", 0, ["job.queued"], 100).events
@@ -107,7 +105,6 @@ def test_that_a_job_was_submitted_is_told_as_it_was_submitted_whatever_became_of
     assert (ended.event.data.id, ended.event.data.status) == (job, "succeeded")
 
 
-@in_both_homes
 def test_the_event_of_a_job_that_was_deleted_is_passed_over(stock):
     job = stock.calibrated("v")
     stock.expiry.delete_jobs([job], datetime.now(UTC))

@@ -15,7 +15,6 @@ def glance(stock, venue="v"):
     return stock.venue_summaries.of([venue]).get(venue)
 
 
-@in_both_homes
 def test_a_venue_shows_how_its_last_calibration_ended_and_the_errors_of_its_results(stock):
     stock.venue("v")
     assert glance(stock) is None

@@ -47,7 +47,6 @@ def test_a_name_is_of_one_key(keys):
     assert [key.scope for key in keys.all()] == ["read"]
 
 
-@in_both_homes
 def test_an_expired_key_is_still_a_key(keys):
     assert not keys.any()
     keys.add("old", "read", datetime.now(UTC) - timedelta(seconds=1))

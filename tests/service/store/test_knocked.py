@@ -5,7 +5,6 @@ import pytest
 from service.schemas.geometry import Moved
 from service.schemas.results import Proposal
 from service.store.memories import newest_memories
-from tests.homes import in_both_homes
 from tests.service.store.test_alarms import rings, told, watched
 from tests.service.store.test_partly import standing
 from tests.trending import displacement
@@ -40,7 +39,6 @@ def newest(stock):
     return stock.venues.history("v", None, 1)[0]
 
 
-@in_both_homes
 def test_a_proposal_is_stored_by_accepting_the_job_and_by_nothing_else(stock):
     stock.venue("v")
     job = knocked(stock, recovered=False)
@@ -70,7 +68,6 @@ def test_the_trend_of_a_camera_begins_anew_where_it_was_found(stock):
     assert found.anchor != before
 
 
-@in_both_homes
 def test_an_alarm_rings_for_a_knocked_camera_with_how_far_it_turned_until_somebody_accepts_it(stock):
     watched(stock, knocked=True)
     job = knocked(stock, recovered=False)

@@ -1,4 +1,4 @@
-"""Live poses in the store: the newest report, the minutes, and the alarms that ring by them, in both homes."""
+"""Live poses in the store: the newest report, the minutes, and the alarms that ring by them."""
 
 from datetime import UTC, datetime, timedelta
 

@@ -1,4 +1,4 @@
-"""What earlier nights measured stays with the poses that it belongs to, in both homes."""
+"""What earlier nights measured stays with the poses that it belongs to."""
 
 import pytest
 import sqlalchemy as sa
@@ -46,7 +46,6 @@ def test_a_job_is_given_the_memories_that_the_last_accepted_one_left(stock):
     assert second.taken_at == stock.jobs.get(second.job_id).created_at
 
 
-@in_both_homes
 def test_of_a_partly_accepted_job_only_the_accepted_cameras_remember_it(stock):
     stock.venue("v")
     night(stock, 1)
@@ -54,24 +53,14 @@ def test_of_a_partly_accepted_job_only_the_accepted_cameras_remember_it(stock):
     assert remembered(stock) == {"left": 2, "right": 1}
 
 
-@in_both_homes
-@pytest.mark.parametrize("how", [{"accepted": False}, {"dry_run": True}])
-def test_what_moves_no_pose_is_not_remembered(stock, how):
+@pytest.mark.parametrize("how", [{"accepted": False}, {"dry_run": True}, {"memories": ()}])
+def test_what_moves_no_pose_or_knows_no_memories_leaves_them_as_they_are(stock, how):
     stock.venue("v")
     night(stock, 1)
     night(stock, 2, **how)
     assert remembered(stock) == {"left": 1, "right": 1}
 
 
-@in_both_homes
-def test_an_older_worker_that_knows_no_memories_leaves_them_as_they_are(stock):
-    stock.venue("v")
-    night(stock, 1)
-    stock.calibrated("v")
-    assert remembered(stock) == {"left": 1, "right": 1}
-
-
-@in_both_homes
 @pytest.mark.parametrize("put", [{}, {"intrinsics": LONGER}])
 def test_a_camera_that_is_put_elsewhere_or_has_another_lens_begins_anew(stock, put):
     stock.venue("v")
@@ -80,7 +69,6 @@ def test_a_camera_that_is_put_elsewhere_or_has_another_lens_begins_anew(stock, p
     assert remembered(stock) == {"right": 1}
 
 
-@in_both_homes
 def test_another_name_or_a_better_known_lens_changes_no_memory(stock):
     stock.venue("v")
     night(stock, 1)
@@ -103,7 +91,6 @@ def test_on_another_field_all_cameras_begin_anew_and_no_undoing_brings_the_night
     assert remembered(stock) == {}
 
 
-@in_both_homes
 def test_undoing_a_job_takes_its_night_back(stock):
     stock.venue("v")
     night(stock, 1)
@@ -117,7 +104,6 @@ def test_undoing_a_job_takes_its_night_back(stock):
     assert remembered(stock) == {}
 
 
-@in_both_homes
 def test_a_camera_whose_refused_pose_is_accepted_by_hand_begins_anew(stock):
     stock.venue("v")
     night(stock, 1)
@@ -126,7 +112,6 @@ def test_a_camera_whose_refused_pose_is_accepted_by_hand_begins_anew(stock):
     assert remembered(stock) == {"left": 2}
 
 
-@in_both_homes
 def test_a_dry_run_that_is_accepted_by_hand_leaves_the_memories(stock):
     stock.venue("v")
     night(stock, 1)
@@ -144,7 +129,6 @@ def test_the_memories_of_the_last_few_revisions_are_kept(stock):
     assert remembered(stock) == {}
 
 
-@in_both_homes
 def test_memories_that_are_too_large_are_dropped_with_the_old_ones_and_logged(stock):
     stock.venue("v")
     night(stock, 1)
@@ -156,7 +140,6 @@ def test_memories_that_are_too_large_are_dropped_with_the_old_ones_and_logged(st
     assert (line["venue"], line["most"]) == ("v", LARGEST_BYTES)
 
 
-@in_both_homes
 def test_a_deleted_venue_leaves_no_memories(stock):
     stock.venue("v")
     night(stock, 1)

@@ -1,4 +1,4 @@
-"""A calibration that is accepted of some cameras only: what is stored, counted, told and undone, in both homes."""
+"""A calibration that is accepted of some cameras only: what is stored, counted, told and undone."""
 
 import pytest
 
@@ -42,14 +42,12 @@ def test_only_the_poses_that_are_accepted_are_stored(stock):
     assert stock.jobs.get(job).result.verdict == "partly"
 
 
-@in_both_homes
 def test_a_dry_run_stores_none_of_them(stock):
     stock.venue("v")
     partly(stock, dry_run=True)
     assert standing(stock) == BEFORE
 
 
-@in_both_homes
 def test_a_venue_that_was_changed_meanwhile_takes_none_of_them(stock):
     stock.venue("v")
     running = stock.attempts.begin(stock.submitted("v"))
@@ -64,7 +62,6 @@ def test_a_venue_that_was_changed_meanwhile_takes_none_of_them(stock):
 # By hand
 
 
-@in_both_homes
 def test_the_cameras_that_were_rejected_can_be_taken_by_hand(stock):
     stock.venue("v")
     job = partly(stock)
@@ -74,7 +71,6 @@ def test_the_cameras_that_were_rejected_can_be_taken_by_hand(stock):
     assert [one.cause for one in stock.venues.history("v", None, 9)] == ["accepted", "calibrated", "put"]
 
 
-@in_both_homes
 def test_one_camera_after_the_other_can_be_taken_by_hand(stock):
     stock.venue("v")
     job = stock.calibrated("v", accepted=False)
@@ -86,7 +82,6 @@ def test_one_camera_after_the_other_can_be_taken_by_hand(stock):
     assert [one.revision for one in stock.venues.history("v", None, 9)] == [3, 2, 1]
 
 
-@in_both_homes
 def test_to_give_a_job_back_gives_back_what_was_taken_of_it_by_hand_as_well(stock):
     stock.venue("v")
     job = partly(stock)
@@ -100,7 +95,6 @@ def test_to_give_a_job_back_gives_back_what_was_taken_of_it_by_hand_as_well(stoc
     assert standing(stock) == {"left": -1.0, "right": -0.999}
 
 
-@in_both_homes
 def test_the_rest_is_not_taken_once_something_else_has_come(stock):
     stock.venue("v")
     job = partly(stock)
@@ -114,7 +108,6 @@ def test_the_rest_is_not_taken_once_something_else_has_come(stock):
 # What is told
 
 
-@in_both_homes
 def test_health_tells_of_each_camera_when_it_was_accepted_and_how_often_not_since(stock):
     stock.venue("v")
     partly(stock)
@@ -128,7 +121,6 @@ def test_health_tells_of_each_camera_when_it_was_accepted_and_how_often_not_sinc
     assert [camera.rejected_in_a_row for camera in stock.venues.health("v").cameras] == [0, 0]
 
 
-@in_both_homes
 def test_a_camera_that_is_rejected_again_and_again_rings_by_itself(stock):
     watched(stock, rejected_in_a_row=2)
     partly(stock)
@@ -141,7 +133,6 @@ def test_a_camera_that_is_rejected_again_and_again_rings_by_itself(stock):
     assert told(stock) == [("rejected-in-a-row", "began"), ("rejected-in-a-row", "ended")]
 
 
-@in_both_homes
 def test_a_camera_whose_pose_is_old_rings_by_itself_until_it_is_accepted(stock):
     watched(stock, not_calibrated_for_h=24)
     stock.time_passes(hours=23)
@@ -164,7 +155,6 @@ def test_it_is_a_verdict_of_its_own_where_jobs_are_counted_and_listed(stock):
     assert read_statistics(stock.engine, 10).counters["jobs_ended", ("succeeded", "partly", "")] == 1
 
 
-@in_both_homes
 def test_what_a_camera_usually_shows_is_what_it_showed_when_it_was_accepted(stock):
     stock.venue("v")
     calibrated(stock, True, view=View(usable=True, detail="", lines_found=0.9))
@@ -173,7 +163,6 @@ def test_what_a_camera_usually_shows_is_what_it_showed_when_it_was_accepted(stoc
     assert {camera: view.lines_found for camera, view in views.items()} == {"left": 0.5, "right": 0.9}
 
 
-@in_both_homes
 def test_the_light_of_a_camera_is_kept_with_its_pose_and_until_another_is_found(stock):
     light = Light(gain=[1.1, 1.0, 0.9], contrast=0.05, falloff=0.1)
     stock.venue("v")

@@ -1,4 +1,4 @@
-"""Refined poses and lenses in the results of jobs: to whom they belong, and how they are stored, in both homes."""
+"""Refined poses and lenses in the results of jobs: to whom they belong, and how they are stored."""
 
 import pytest
 import sqlalchemy as sa
@@ -51,7 +51,6 @@ def test_each_camera_has_that_of_the_last_job_that_moved_it(stock):
     assert along(stock) == {}
 
 
-@in_both_homes
 def test_a_restored_pose_has_that_of_its_own_job(stock):
     stock.venue("v")
     night(stock)
@@ -62,7 +61,6 @@ def test_a_restored_pose_has_that_of_its_own_job(stock):
     assert along(stock) == {}
 
 
-@in_both_homes
 def test_a_camera_that_was_put_since_has_none_and_on_another_field_nobody_has(stock):
     stock.venue("v")
     night(stock)
@@ -73,7 +71,6 @@ def test_a_camera_that_was_put_since_has_none_and_on_another_field_nobody_has(st
     assert along(stock) == {}
 
 
-@in_both_homes
 def test_a_refused_pose_that_is_accepted_by_hand_has_none(stock):
     stock.venue("v")
     stock.decisions.accept(night(stock, accepted=["right"]))
@@ -102,7 +99,6 @@ def test_to_store_one_is_a_revision_that_keeps_the_memories_and_what_is_known_of
     assert along(stock) == {"left": -0.999, "right": -0.999}
 
 
-@in_both_homes
 def test_a_camera_without_one_is_refused_and_nothing_is_written(stock):
     stock.venue("v")
     stock.calibrated("v")
@@ -111,7 +107,6 @@ def test_a_camera_without_one_is_refused_and_nothing_is_written(stock):
     assert len(stock.venues.history("v", None, 9)) == 2
 
 
-@in_both_homes
 def test_a_calibration_that_runs_meanwhile_is_rejected(stock):
     stock.venue("v")
     night(stock)
@@ -121,7 +116,6 @@ def test_a_calibration_that_runs_meanwhile_is_rejected(stock):
     assert stock.jobs.get(running.job_id).result.rejected_because == "the venue was changed while the job ran"
 
 
-@in_both_homes
 def test_a_job_that_was_deleted_takes_its_refined_poses_along(stock):
     stock.venue("v")
     stock.expiry.delete_jobs([night(stock)], stock.expiry.now())

@@ -1,4 +1,4 @@
-"""The history of a venue, and the ways back, in both homes."""
+"""The history of a venue, and the ways back."""
 
 import pytest
 
@@ -37,7 +37,6 @@ def test_every_change_of_the_poses_is_a_revision_with_its_cause(stock):
     assert stock.venues.history("v", 3, 1)[0].stitch_error_px == 0.2
 
 
-@in_both_homes
 def test_a_put_that_moves_nothing_is_no_revision(stock):
     venue = stock.venue("v")
     stock.venues.put(venue.model_copy(update={"name": "renamed"}), anyway)
@@ -61,7 +60,6 @@ def known(stock):
     return [camera.intrinsics.sigma for camera in stock.venues.get("v").cameras]
 
 
-@in_both_homes
 def test_how_well_a_lens_is_known_is_kept_and_no_revision(stock):
     stock.venues.put(known_to(stock.venue("v"), KNOWN), anyway)
     assert (known(stock), told(stock)) == ([KNOWN] * 2, [(1, "put", None, None)])
@@ -70,7 +68,6 @@ def test_how_well_a_lens_is_known_is_kept_and_no_revision(stock):
     assert [camera.drift_since for camera in stock.venues.history("v", None, 1)[0].cameras] == [2, 1]
 
 
-@in_both_homes
 def test_an_older_revision_with_the_same_lens_is_known_as_well_as_now(stock):
     stock.venue("v")
     stock.moved_by_hand("v", -3.0)
@@ -83,7 +80,6 @@ def test_an_older_revision_with_the_same_lens_is_known_as_well_as_now(stock):
     assert known(stock) == [None, KNOWN]
 
 
-@in_both_homes
 def test_a_lens_that_is_known_better_meanwhile_stops_no_result(stock):
     stock.venue("v")
     running = stock.attempts.begin(stock.submitted("v"))
@@ -129,14 +125,12 @@ def test_an_older_revision_holds_again_with_its_lenses_and_its_ridge(stock):
     assert [camera.drift_since for camera in stock.venues.history("v", None, 1)[0].cameras] == [3, 1]
 
 
-@in_both_homes
 def test_what_holds_anyway_is_not_restored(stock):
     stock.venue("v")
     stock.venues.restore("v", 1, anyway)
     assert told(stock) == [(1, "put", None, None)]
 
 
-@in_both_homes
 def test_a_revision_that_does_not_fit_is_refused(stock):
     venue = stock.venue("v")
     crown = venue.field.model_copy(update={"ridge": [[-50.0, 0.0, 0.2], [50.0, 0.0, 0.2]]})
@@ -152,7 +146,6 @@ def test_a_revision_that_does_not_fit_is_refused(stock):
         stock.venues.restore("v", 9, anyway)
 
 
-@in_both_homes
 def test_a_venue_that_is_made_again_has_a_history_of_its_own(stock):
     stock.venue("v")
     stock.moved_by_hand("v", -3.0)
@@ -164,7 +157,6 @@ def test_a_venue_that_is_made_again_has_a_history_of_its_own(stock):
 # By hand
 
 
-@in_both_homes
 @pytest.mark.parametrize("how", [{"accepted": False}, {"dry_run": True}])
 def test_a_result_that_did_not_move_the_venue_can_be_taken_by_hand(stock, how):
     stock.venue("v")
@@ -189,7 +181,6 @@ def test_what_was_taken_can_be_given_back_and_taken_again(stock):
     assert (standing(stock), told(stock)[0]) == (-1.0, (5, "restored", job, 3))
 
 
-@in_both_homes
 def test_nothing_by_hand_undoes_what_came_later(stock):
     stock.venue("v")
     refused, taken = stock.calibrated("v", accepted=False), stock.calibrated("v")
@@ -203,14 +194,12 @@ def test_nothing_by_hand_undoes_what_came_later(stock):
     assert standing(stock) == -3.0
 
 
-@in_both_homes
 def test_giving_back_what_never_held_changes_nothing(stock):
     stock.venue("v")
     stock.decisions.reject(stock.calibrated("v", accepted=False))
     assert told(stock) == [(1, "put", None, None)]
 
 
-@in_both_homes
 def test_a_job_without_poses_has_none_to_take(stock):
     stock.venue("v")
     waiting = stock.submitted("v")
@@ -219,7 +208,6 @@ def test_a_job_without_poses_has_none_to_take(stock):
             decide(waiting)
 
 
-@in_both_homes
 def test_poses_that_were_found_for_another_venue_are_not_taken(stock):
     venue = stock.venue("v")
     job = stock.calibrated("v", accepted=False)
@@ -228,7 +216,6 @@ def test_poses_that_were_found_for_another_venue_are_not_taken(stock):
         stock.decisions.accept(job)
 
 
-@in_both_homes
 def test_what_is_decided_while_a_job_runs_is_not_undone_by_its_result(stock):
     stock.venue("v")
     first = stock.calibrated("v")

@@ -1,4 +1,4 @@
-"""Schedules of venues in both homes: fired once, by one worker, whatever happens to workers."""
+"""Schedules of venues: fired once, by one worker, whatever happens to workers."""
 
 from collections import Counter
 from datetime import UTC, datetime, timedelta
@@ -54,7 +54,6 @@ def test_how_late_a_venue_fires_is_bounded_and_always_the_same(cron, longest):
         assert next_time(cron, "UTC", first, place) == first + (next_time(cron, "UTC", exact) - exact)
 
 
-@in_both_homes
 def test_a_schedule_that_must_be_exact_is(stock, schedules):
     spread = put(stock).next_at
     exact = put(stock, exact=True).next_at

@@ -1,7 +1,4 @@
-"""The trend of each camera: counted from its anchor, charted, bounded and undone, in both homes.
-
-What months of nights add up to is counted alike in both, and tested in one.
-"""
+"""The trend of each camera: counted from its anchor, charted, bounded and undone."""
 
 from datetime import UTC, datetime, timedelta
 
@@ -32,7 +29,6 @@ def rows(stock):
         return connection.scalar(sa.select(sa.func.count()).select_from(tables.camera_trend))
 
 
-@in_both_homes
 def test_a_venue_that_was_never_calibrated_has_an_empty_trend(stock):
     stock.venue("v")
     found = trend(stock)
@@ -49,7 +45,6 @@ def test_the_first_accepted_pose_is_the_anchor_and_later_ones_are_counted_from_i
     assert (trend(stock).anchor, trend(stock).baseline_nights) == (1, 3)
 
 
-@in_both_homes
 def test_a_job_is_given_the_pose_that_its_cameras_are_counted_from(stock):
     assert stock.attempts.begin(stock.submitted("v")).anchors == {}
     stock.decisions.cancel(stock.enqueued[0])
@@ -60,7 +55,6 @@ def test_a_job_is_given_the_pose_that_its_cameras_are_counted_from(stock):
     assert (anchor.revision, anchor.posed) == (1, anchored.posed)
 
 
-@in_both_homes
 def test_rejected_results_and_those_of_older_workers_leave_no_trace(stock):
     night(stock, displacement(0.0))
     night(stock, displacement(0.5), accepted=False)
@@ -68,7 +62,6 @@ def test_rejected_results_and_those_of_older_workers_leave_no_trace(stock):
     assert len(trend(stock).points) == 1
 
 
-@in_both_homes
 def test_a_camera_that_was_put_elsewhere_begins_anew_and_the_others_go_on(stock):
     nights(stock, 2, AUTUMN, lambda _: displacement(0.01))
     stock.moved_by_hand("v", -3.0)
@@ -77,7 +70,6 @@ def test_a_camera_that_was_put_elsewhere_begins_anew_and_the_others_go_on(stock)
     assert (moved_m(stock), moved_m(stock, "right")) == ([0.0], [0.0, 0.01, 0.04])
 
 
-@in_both_homes
 def test_a_result_that_a_person_accepts_is_the_new_anchor(stock):
     nights(stock, 2, AUTUMN, lambda _: displacement(0.01))
     job = night(stock, displacement(0.3), accepted=False)
@@ -88,7 +80,6 @@ def test_a_result_that_a_person_accepts_is_the_new_anchor(stock):
     assert (point.jobs, point.across_m) == (2, pytest.approx(0.01))
 
 
-@in_both_homes
 def test_a_person_who_accepts_what_holds_already_says_that_the_camera_is_right_there(stock):
     venue = stock.venue("v")
     stock.venues.put(venue.model_copy(update={"alarms": Alarms(trend_m=0.03)}), anyway)
@@ -101,7 +92,6 @@ def test_a_person_who_accepts_what_holds_already_says_that_the_camera_is_right_t
     assert len(stock.venues.history("v", None, 100)) == 41
 
 
-@in_both_homes
 def test_a_job_that_is_rejected_by_hand_is_taken_out_of_the_trend(stock):
     nights(stock, 2, AUTUMN, lambda _: displacement(0.01))
     stock.decisions.reject(night(stock, displacement(0.2), at=AUTUMN + timedelta(days=2)))
@@ -218,7 +208,6 @@ def test_what_is_usual_outlives_the_nights_that_it_was_learnt_from(stock, monkey
     assert trend(stock).moved_m == pytest.approx(0.0008 * 50, abs=SIGMA_M)
 
 
-@in_both_homes
 def test_nights_before_a_moment_are_left_out_and_charted_all_the_same(stock):
     nights(stock, 5, AUTUMN, noisy(4))
     every, some = trend(stock), trend(stock, since=AUTUMN + timedelta(days=3))

@@ -117,7 +117,6 @@ def test_it_is_restored_put_and_deleted(stock, service, broken, spoilt, way_out,
         assert 'esc_unreadable_rows{kind="venue"} 0.0' in service.ask("GET", "/metrics").text
 
 
-@in_both_homes
 def test_a_put_of_it_goes_by_its_conditions_and_knows_its_passwords(stock, service, broken):
     assert service.ask("PUT", broken, json=venue("broken"), headers={"If-Match": '"seen"'}).status_code == 412
     assert service.ask("PUT", broken, json=venue("broken"), headers={"If-None-Match": "*"}).status_code == 412
@@ -169,7 +168,6 @@ def test_a_job_that_cannot_be_read_is_listed_apart_and_deleted(stock, service):
     assert "unreadable" not in service.ask("GET", "/jobs").json()
 
 
-@in_both_homes
 @pytest.mark.parametrize(
     ("table", "column", "key"),
     [
@@ -204,7 +202,6 @@ def test_no_other_row_of_a_venue_takes_it_down(stock, service, table, column, ke
     assert service.ask("DELETE", "/venues/v").status_code == 204
 
 
-@in_both_homes
 def test_poses_with_a_ridge_that_no_field_has_are_not_accepted(stock, service):
     job = rejected_with(stock, "v", ridge=SUNKEN)
     before = service.ask("GET", "/venues/v").json()
@@ -215,7 +212,6 @@ def test_poses_with_a_ridge_that_no_field_has_are_not_accepted(stock, service):
     assert service.ask("GET", "/venues/v").json() == before
 
 
-@in_both_homes
 def test_a_restore_says_which_nights_it_drops(stock, service):
     memory = {"nights": []}
     stock.venue("v")
