@@ -27,7 +27,7 @@ from service.store.database import LIMITS, postgresql, sqlite_file
 APPLICATION = "esc"
 QUEUE = "calibration"
 WORKFLOW = "calibrate"
-# Of the queue's own tables on PostgreSQL.
+# The schema of the queue's own tables on PostgreSQL.
 SCHEMA = "dbos"
 # The engine's default is a hash of the source; after a deployment the jobs of the old version would never be begun.
 VERSION = "1"
@@ -143,7 +143,7 @@ class WorkerQueue:
             "system_database_engine": _engine(url, limits=""),
             "executor_id": worker,
             "application_version": VERSION,
-            # What would be listened for are events of workflows, which nobody here sends.
+            # It would listen for events of workflows, which nobody here sends.
             "use_listen_notify": False,
             "log_level": "WARNING",
         }

@@ -176,7 +176,7 @@ def _overdue(
 def _moved(rules: Alarms, newest: Revision) -> dict[AlarmKey, str]:
     rings: dict[AlarmKey, str] = {}
     for camera in newest.cameras:
-        # What somebody put or put back is where they want it.
+        # A camera that a person put or restored is where that person wants it.
         if newest.cause in CALIBRATION_CAUSES and _exceeds(camera.moved, rules.moved_since_last_px):
             found = " and was found again" if newest.cause == "recovered" else ""
             moved = _movement_in_words(camera, "moved")

@@ -34,7 +34,7 @@ class DamagedBlob(Exception):  # noqa: N818
     """An object is empty, or its hash is not the one in its name; the message says which."""
 
 
-# What is raised while a bucket is away, or a disk full: trying again later can help.
+# Errors while a bucket is away or a disk full: trying again later can help.
 BLOB_OUTAGES = (BaseError, BlobFolderUnavailable)
 # For one answer of a bucket to one request.
 ANSWER_S = 30.0
@@ -64,7 +64,7 @@ def _raising_blob_outages(
             raise BlobFolderUnavailable(str(error)) from error
         except BaseError as error:
             if blobs.is_folder:
-                # What was tried stands on the lines below.
+                # The lines below say what was tried.
                 raise BlobFolderUnavailable(str(error).partition("\n")[0]) from error
             raise
 
@@ -182,7 +182,7 @@ class Blobs:
     def delete_under(self, prefix: str) -> None:
         """Remove the folder `prefix` with every object in it."""
         if self._folder:
-            # Whoever died over a `put` left its beginning here under another name, which no list of objects shows.
+            # A process that died during a `put` left its beginning here under a name that no list of objects shows.
             with suppress(FileNotFoundError):
                 shutil.rmtree(self._folder / prefix)
             return

@@ -28,7 +28,7 @@ from service.store.database import (
 from service.store.jobs.attempts import Enqueue
 
 ROWS_AT_ONCE = 500
-# Whoever has the file of a database open holds a lock on it, so a service is noticed although it does nothing.
+# A process with the database file open locks it, so that even an idle service is noticed.
 LOCKED_AFTER_MS = 2000
 j = tables.jobs.c
 

@@ -28,9 +28,9 @@ MIGRATIONS = Path(__file__).parent / "migrations"
 # Which schema a database has.
 SCHEMA_TABLE = "esc_schema"
 WRITES = "esc_writes"
-# How a transaction that reads is to see one state; every transaction of SQLite does.
+# Options by which a reading transaction sees one state; every transaction of SQLite does.
 SNAPSHOT: dict[str, dict[str, Any]] = {"sqlite": {}, "postgresql": {"isolation_level": "REPEATABLE READ"}}
-# What is raised while the database is away, locked or changing its machine: trying again later can help.
+# Errors while the database is away, locked or moving to another machine: trying again later can help.
 DATABASE_OUTAGES = (sa.exc.OperationalError, sa.exc.InterfaceError, sa.exc.InternalError, sa.exc.TimeoutError)
 # By their code, errors of PostgreSQL that gave a statement up.
 GIVEN_UP = {
@@ -39,7 +39,7 @@ GIVEN_UP = {
 }
 # Any number, the same everywhere: of the locks by which writers wait for each other on PostgreSQL.
 LOCK = 0x45_53_43
-# How long a thread waits for a connection while all of them are busy. There are fewer connections than threads.
+# The wait for a connection while all of them are busy. There are fewer connections than threads.
 POOL_TIMEOUT_S = 5.0
 # Server settings of each connection. What a machine held that vanished in the middle of a transaction is free again
 # within a minute. One locked table must not hold every thread that answers: statements have limits, below which all of
@@ -47,7 +47,7 @@ POOL_TIMEOUT_S = 5.0
 SESSION = "-c idle_in_transaction_session_timeout=60s"
 LIMITS = "-c statement_timeout=15s -c lock_timeout=5s"
 UNLIMITED, LONGEST = "esc_unlimited", "10min"
-# What libpq is told unless the URL says otherwise: a server that is out of reach is given up after seconds.
+# Defaults for libpq, which the URL overrides: a server that is out of reach is given up after seconds.
 PATIENCE = {
     "connect_timeout": "5",
     "keepalives_idle": "10",

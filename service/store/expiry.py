@@ -37,7 +37,7 @@ LAST_ACCEPTED = (
     .correlate(tables.jobs)
     .scalar_subquery()
 )
-# Of the same venue: the revision that holds, and the last whose poses a job brought.
+# Within the same venue: the newest revision, and the newest whose poses a job brought.
 others = sa.alias(tables.revisions, "others")
 NEWEST = sa.select(others.c.number).where(others.c.venue == r.venue).order_by(others.c.number.desc()).limit(1)
 NEWEST_TAKEN = NEWEST.where(others.c.cause.in_(CALIBRATION_CAUSES))
@@ -166,7 +166,7 @@ class ExpiryRepository(Repository):
             rows = connection.execute(old).all()
             if not rows:
                 return Counter()
-            # That of a job goes with its job, and says until then how it ended.
+            # The delivery of a job is deleted with its job, and says until then how it ended.
             of_jobs = sa.update(tables.deliveries).where(d.id.in_([row.id for row in rows if row.event is None]))
             said = sa.func.coalesce(d.last_error, "its turn did not come in time")
             connection.execute(of_jobs.values(status="given-up", last_error=said))

@@ -25,7 +25,7 @@ from service.store.unreadable import read_or, read_values
 from service.store.venues import find_venue, venue_lock
 
 RUNNING_WITHIN, LATELY = timedelta(seconds=5), timedelta(days=1)
-# Of the figures in /metrics: the minute that goes on, and the one before it.
+# The share of measured pictures in /metrics is over the current minute and the one before it.
 SHARE_OVER = timedelta(minutes=2)
 r = tables.live_reports.c
 m = tables.live_minutes.c

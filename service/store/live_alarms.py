@@ -22,8 +22,8 @@ from service.store.unreadable import read_or
 
 NOT_MEASURED_FOR, LATE_FOR, SILENT_FOR = timedelta(seconds=10), timedelta(minutes=1), timedelta(seconds=30)
 LATE_MS = 1000.0
-# Of several processes for one venue: one that is missed for a day is none that anybody waits for, and a fleet of
-# renderers has two or three.
+# Limits of the processes that are watched for one venue: one that is missing for a day is no longer expected, and a
+# fleet of renderers has two or three.
 FORGOTTEN_AFTER, MOST_OTHERS = timedelta(days=1), 8
 OTHERS = "others"
 SECOND = "%Y-%m-%d %H:%M:%S"

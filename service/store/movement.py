@@ -21,10 +21,10 @@ from service.schemas.geometry import Moved, PosedCamera
 from service.schemas.names import LensModel
 
 Array = NDArray[np.float64]
-# Of all markings together; as many more as there are markings.
+# The points on all markings together; rounding adds at most one for each marking.
 POINTS = 150
-# Where a lens is looked at (tangent from the axis) to find where its formula turns back: the whole picture of a long
-# one lies within some thousandths.
+# Samples (tangent of the angle from the axis) for finding where a lens model turns back: the whole picture of a long
+# lens lies within some thousandths.
 NEAREST, WIDEST, STEPS = 1e-4, 6.0, 600
 
 

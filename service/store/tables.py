@@ -41,7 +41,7 @@ revisions = sa.Table(
     sa.Column("at", Instant, nullable=False),
     # schemas.history.Cause.
     sa.Column("cause", sa.String(16), nullable=False),
-    # Whose poses they are, or, of what was put back, whose were rejected by hand.
+    # The job that found the poses; of a restored revision, the job whose poses were rejected by hand.
     sa.Column("job", sa.String(26)),
     sa.Column("restored_from", sa.Integer),
     sa.Column("stitch_error_px", sa.Double),
@@ -52,7 +52,7 @@ revisions = sa.Table(
     sa.Column("field_numbers", sa.JSON(none_as_null=True)),
     # schemas.geometry.Movement by camera.
     sa.Column("movements", sa.JSON, nullable=False),
-    # Who made it, see actors.py; null: the service by itself.
+    # The actor, see actors.py; null: the service by itself.
     sa.Column("asked_by", sa.String(80)),
     sa.Column("address", sa.String(64)),
     sa.Column("request_id", sa.String(64)),
@@ -61,7 +61,7 @@ revisions = sa.Table(
     sa.Index("revisions_by_time", "cause", "at"),
 )
 
-# What earlier nights of a venue's cameras measured, see memories.py.
+# Memories of a venue's cameras: measurements of earlier nights, see memories.py.
 memories = sa.Table(
     "memories",
     metadata,
@@ -72,7 +72,7 @@ memories = sa.Table(
     sa.Column("document", sa.JSON, nullable=False),
 )
 
-# Of a calibration that waits or runs. A query that says it in these words finds it in the index of these words.
+# Condition of a queued or running calibration; a query with these very words can use the index with this condition.
 ACTIVE = sa.text("status IN ('queued', 'running') AND kind = 'calibration'")
 
 jobs = sa.Table(
@@ -85,10 +85,10 @@ jobs = sa.Table(
     sa.Column("venue", sa.String(64)),
     sa.Column("status", sa.String(16), nullable=False),
     sa.Column("priority", sa.Integer, nullable=False),
-    # What was asked: schemas.options.Options, FieldOptions or FindOptions (the seed filled in), IntrinsicsOptions or
+    # The request: schemas.options.Options, FieldOptions or FindOptions (the seed filled in), IntrinsicsOptions or
     # LocateOptions.
     sa.Column("options", sa.JSON, nullable=False),
-    # Of the frames and options as they were sent: the same content is the same job.
+    # Hash of the frames and options as they were sent: the same content is the same job.
     sa.Column("content_hash", sa.String(64), nullable=False),
     sa.Column("idempotency_key", sa.String(255)),
     # The venue as it was when the frames were checked against it; JSON's null where there is none.
@@ -163,20 +163,20 @@ leftovers = sa.Table(
     sa.Index("leftovers_by_due", "due_at"),
 )
 
-# What happened to venues, in the order of each one's transactions; for as long as somebody may come back and ask.
+# The event log: what happened to venues, in the order of each one's transactions, until it expires.
 events = sa.Table(
     "events",
     metadata,
     # Never given twice, also after the last one was deleted: clients go on from it.
     sa.Column("id", sa.BigInteger().with_variant(sa.Integer, "sqlite"), primary_key=True),
     sa.Column("venue", sa.String(64), nullable=False),
-    # Of schemas.events.venue_event.Event.
+    # The `type` of schemas.events.venue_event.Event.
     sa.Column("type", sa.String(32), nullable=False),
     sa.Column("at", Instant, nullable=False),
     # Its data; of a job that ended, which is read when it is told, null.
     sa.Column("data", sa.JSON(none_as_null=True)),
     sa.Column("job", sa.String(26)),
-    # Who made it, see actors.py; null: the service by itself.
+    # The actor, see actors.py; null: the service by itself.
     sa.Column("asked_by", sa.String(80)),
     sa.Column("address", sa.String(64)),
     sa.Column("request_id", sa.String(64)),
@@ -184,11 +184,11 @@ events = sa.Table(
     sqlite_autoincrement=True,
 )
 
-# Who is to be told of what: written with what happened, attempted until it succeeds or is given up.
+# The outbox: deliveries, written with their events, attempted until they succeed or are given up.
 deliveries = sa.Table(
     "deliveries",
     metadata,
-    # Of the job that has ended, or one of its own.
+    # The id of the job that has ended, or of the delivery alone.
     sa.Column("id", sa.String(26), primary_key=True),
     sa.Column("url", sa.String(2048), nullable=False),
     # The host of the URL.
@@ -196,7 +196,7 @@ deliveries = sa.Table(
     # `waiting`, then `delivered` or `given-up`.
     sa.Column("status", sa.String(16), nullable=False),
     sa.Column("attempts", sa.Integer, nullable=False, default=0),
-    # Of the next attempt.
+    # The time of the next attempt.
     sa.Column("due_at", Instant, nullable=False),
     # Why the last attempt that failed did.
     sa.Column("last_error", sa.String(500)),
@@ -215,16 +215,16 @@ tallies = sa.Table(
     sa.Column("value", sa.Double, nullable=False),
 )
 
-# What the last result of each venue said, see statistics/venue_quality.py.
+# Quality of each venue by its last results, see statistics/venue_quality.py.
 venue_quality = sa.Table(
     "venue_quality",
     metadata,
     sa.Column("venue", sa.String(64), primary_key=True),
     sa.Column("stitch_error_px", sa.Double),
     sa.Column("moved_px", sa.Double),
-    # When the poses that hold were accepted; null: they were put.
+    # The time at which the poses in use were accepted; null: they were put.
     sa.Column("accepted_at", Instant),
-    # Of the camera that is furthest from where it was put.
+    # Drift of the camera that is furthest from where it was put.
     sa.Column("drift_px", sa.Double),
     # Calibrations since then that brought no pose for any camera; dry runs do not count.
     sa.Column("rejected_in_a_row", sa.Integer, nullable=False, server_default="0"),
@@ -232,7 +232,7 @@ venue_quality = sa.Table(
     sa.Column("cameras", sa.JSON(none_as_null=True)),
     # statistics.venue_summary.CalibrationSummary; null: it was never calibrated.
     sa.Column("glance", sa.JSON(none_as_null=True)),
-    # When an alarm rings if nothing happens before.
+    # The next time at which an alarm begins unless something happens before.
     sa.Column("alarm_due_at", Instant),
     sa.Index("venues_by_stitch_error", "stitch_error_px"),
     sa.Index("venues_by_alarm", "alarm_due_at"),
@@ -245,14 +245,14 @@ camera_anchors = sa.Table(
     metadata,
     sa.Column("venue", sa.String(64), primary_key=True),
     sa.Column("camera", sa.String(64), primary_key=True),
-    # Of the venue, in which that happened.
+    # The revision of the venue in which that happened.
     sa.Column("revision", sa.Integer, primary_key=True, autoincrement=False),
-    # When the first pose was accepted since then, and schemas.geometry.PosedCamera as it then was; null: none was yet.
+    # The time of the first accepted pose since then, and that schemas.geometry.PosedCamera; null: none was yet.
     sa.Column("at", Instant),
     sa.Column("posed", sa.JSON(none_as_null=True)),
     # By quantity: control_charts.Baseline, once it is settled.
     sa.Column("baselines", sa.JSON, nullable=False),
-    # What the charts said after the last night, see schemas.trend.Trend: whether a mean has moved, by how much at the
+    # The charts after the last night, see schemas.trend.Trend: whether a mean has moved, by how much at the
     # far touchline (null: of an anchor that counts no more, too), the largest cumulative sum, and all of it in words.
     sa.Column("beyond", sa.Boolean, nullable=False),
     sa.Column("moved_m", sa.Double),
@@ -261,7 +261,7 @@ camera_anchors = sa.Table(
     sa.Index("camera_anchors_by_move", "moved_m"),
 )
 
-# How far each accepted job found each camera from its anchor: schemas.trend.Displacement, and the sigma of the pose.
+# Displacement of each camera from its anchor in each accepted job: schemas.trend.Displacement, and the pose's sigma.
 camera_trend = sa.Table(
     "camera_trend",
     metadata,
@@ -289,7 +289,7 @@ camera_trend = sa.Table(
     sa.Index("camera_trend_by_camera", "venue", "camera", "id"),
 )
 
-# Those that ring.
+# Active alarms.
 alarms = sa.Table(
     "alarms",
     metadata,
@@ -303,7 +303,7 @@ alarms = sa.Table(
     sa.Index("alarms_by_since", "since"),
 )
 
-# When each venue that has a schedule is calibrated next.
+# Schedules of venues, and their next times.
 schedules = sa.Table(
     "schedules",
     metadata,
@@ -330,13 +330,13 @@ live_reports = sa.Table(
     "live_reports",
     metadata,
     sa.Column("venue", sa.String(64), primary_key=True),
-    # When it arrived.
+    # The time of arrival.
     sa.Column("reported_at", Instant, nullable=False),
     # schemas.live.LiveState without what the service adds.
     sa.Column("document", sa.JSON, nullable=False),
     # By tracked camera live_alarms.WatchedCamera: since when it is not as it should be.
     sa.Column("watched", sa.JSON, nullable=False),
-    # When an alarm of live poses may begin or end next; null: never, unless another report comes.
+    # The next time at which an alarm of live poses may begin or end; null: never, unless another report comes.
     sa.Column("alarm_due_at", Instant),
     sa.Index("live_reports_by_alarm", "alarm_due_at"),
 )
@@ -346,7 +346,7 @@ live_minutes = sa.Table(
     "live_minutes",
     metadata,
     sa.Column("venue", sa.String(64), primary_key=True),
-    # When the minute began.
+    # The beginning of the minute.
     sa.Column("minute", Instant, primary_key=True),
     # schemas.live.LiveMinuteCamera by camera.
     sa.Column("cameras", sa.JSON, nullable=False),
@@ -367,9 +367,9 @@ workers = sa.Table(
     "workers",
     metadata,
     sa.Column("name", sa.String(255), primary_key=True),
-    # Of the model file the worker computes with; null: the file is missing.
+    # Hash of the model file that the worker computes with; null: the file is missing.
     sa.Column("model_sha256", sa.String(64)),
-    # Of the program.
+    # The version of the program.
     sa.Column("version", sa.String(64)),
     # Jobs that wait and that it cannot read, because a newer version wrote them.
     sa.Column("unreadable_jobs", sa.Integer),
@@ -399,13 +399,13 @@ api_keys = sa.Table(
     sa.Index("api_keys_by_hash", "hash", unique=True),
 )
 
-# Who is signed in with a browser; ends with the key as well.
+# Browser sessions; one ends with its key as well.
 sessions = sa.Table(
     "sessions",
     metadata,
     # SHA-256 of what is in the cookie.
     sa.Column("hash", sa.String(64), primary_key=True),
-    # Of the key that it began with.
+    # Hash of the key that it began with.
     sa.Column("key_hash", sa.String(64), nullable=False),
     sa.Column("expires_at", Instant, nullable=False),
 )

@@ -139,7 +139,7 @@ def note_night(
                 is_another = True
             continue
         if anew:
-            # What is longer than the anchor before says nothing beside the lens that holds now.
+            # A change of focal length since the anchor before says nothing about the lens in use now.
             moved = moved.model_copy(update={"focal_length": None, "sigma_focal_length": None})
         if anchor is None or anew:
             _add_anchor(connection, venue.id, result.id, revision)

@@ -25,9 +25,9 @@ RowKind = Literal["venue", "job", "revision", "event", "live", "statistics", "me
 REMEMBERED_S = 3600.0
 # Rows are named to people who can look at so many.
 MOST_REMEMBERED = 1000
-# Of a row, to be told to a person.
+# The faults of a row that are shown to a person.
 MOST_FAULTS = 3
-# What broken documents raise where code expects another shape: an array in place of an object, a member that is absent.
+# Errors that broken documents raise where code expects another shape: an array instead of an object, a missing member.
 MISSHAPEN = (ValidationError, ValueError, KeyError, TypeError, AttributeError)
 Row = TypeVar("Row")
 Read = TypeVar("Read")

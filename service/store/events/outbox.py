@@ -99,7 +99,7 @@ class OutboxRepository(Repository):
             if _write(connection, delivery, status=outcome, **values):
                 counters.add(connection, {(CALLBACKS, (outcome,)): 1})
                 if delivery.event is not None:
-                    # That of a job goes with its job; nobody asks how far the telling of an event has come.
+                    # The delivery of a job is deleted with its job; nobody asks for the state of an event's.
                     connection.execute(sa.delete(tables.deliveries).where(d.id == delivery.id))
 
 
@@ -122,7 +122,7 @@ def _due(connection: sa.Connection, now: datetime, limit: int, running: Mapping[
 
 
 def _write(connection: sa.Connection, delivery: Delivery, **values: datetime | str) -> bool:
-    # Of an attempt that took so long that another one was begun, nothing is written down.
+    # An attempt that took so long that another one was begun writes nothing.
     this_attempt = (d.id == delivery.id, d.attempts == delivery.attempt, d.status == "waiting")
     return connection.execute(sa.update(tables.deliveries).where(*this_attempt).values(**values)).rowcount == 1
 

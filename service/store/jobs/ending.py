@@ -28,7 +28,7 @@ from service.store.statistics.job_outcome import JobOutcome
 from service.store.statistics.venue_quality import VenueQuality
 from service.store.unreadable import read_or
 
-# What must still hold of a row when it is written.
+# Conditions that a row must still meet when it is written.
 Still = list[sa.ColumnElement[bool]]
 j = tables.jobs.c
 v = tables.venues.c
@@ -55,7 +55,7 @@ def end_job(
         values["result"] = to_document(result)
     if error is not None:
         values["error"] = to_document(error)
-    # Of the venue only what is needed of it here.
+    # Only the webhooks of the venue are read.
     webhooks = sa.select(v.document["webhooks"]).where(v.id == j.venue).scalar_subquery().label("webhooks")
     ended = sa.update(tables.jobs).where(*still).values(status=status, finished_at=now, **values, **changed(now))
     told_of = (j.kind, j.venue, j.options, j.created_at, j.started_at, j.attempt, webhooks)

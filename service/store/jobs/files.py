@@ -11,7 +11,7 @@ LAYERS = ("seam", "stored", "new", "mask")
 STITCHED = ("preview", "preview_before", "seam")
 BIRDSEYE = ("birdseye",)
 OF_CAMERA = ("overlay", "frame", "stored", "new")
-# Of a camera that was looked for.
+# A picture of a candidate of a camera that was looked for.
 CANDIDATE = "candidate"
 
 

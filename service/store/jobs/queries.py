@@ -29,7 +29,7 @@ from service.store.venues import with_result
 
 j = tables.jobs.c
 BRING_POSES: tuple[JobKind, ...] = ("calibration", "find")
-# What pollers ask for, hundreds of times a second: to put the statement together takes longer than to run it.
+# Built once: pollers ask for it hundreds of times a second, and building the statement takes longer than running it.
 ONE = sa.select(tables.jobs).where(j.id == sa.bindparam("job_id"))
 LANE = sa.case((j.kind.in_(list(OWN_QUEUES)), j.kind), else_="")
 PLACE = sa.func.row_number().over(partition_by=LANE, order_by=(j.priority, j.id))

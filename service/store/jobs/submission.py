@@ -25,7 +25,7 @@ from service.store.schedules import reserved_places
 from service.store.venues import find_venue, venue_lock
 
 PRIORITIES = {"live": 1, "routine": 100}
-# How the content hash of a job begins whose frames were fetched.
+# Prefix of the content hash of a job whose frames were fetched.
 FETCHED = "fetched "
 j = tables.jobs.c
 
@@ -116,7 +116,7 @@ class SubmissionRepository(Repository):
         """
         with writing(self._engine) as connection:
             venue_id = submission.venue_id
-            # Those of no venue wait for each other, so that the same content sent twice at once is one job.
+            # Jobs without a venue wait for each other, so that the same content sent twice at once is one job.
             advisory_lock(connection, submission.kind if venue_id is None else venue_lock(venue_id))
             same = _duplicate(
                 connection, submission.kind, venue_id, submission.idempotency_key, submission.content_hash
@@ -279,7 +279,7 @@ def _of_key(connection: sa.Connection, venue_id: str | None, idempotency_key: st
     """Id and content hash of the job of a key, None if there is none."""
     if idempotency_key is None:
         return None
-    # Of no venue is a place of its own.
+    # Jobs without a venue have a namespace of their own.
     here = j.venue.is_(None) if venue_id is None else j.venue == venue_id
     query = sa.select(j.id, j.content_hash).where(here, j.idempotency_key == idempotency_key)
     return connection.execute(query).one_or_none()

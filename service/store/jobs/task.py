@@ -18,7 +18,7 @@ from service.schemas.results import View
 from service.schemas.trend import Anchor
 from service.schemas.venue import Venue
 
-# Where no keys are asked for.
+# The name of the actor where no keys are required.
 ANYONE = "anyone"
 AnyOptions = Options | IntrinsicsOptions | LocateOptions | FieldOptions | FindOptions
 OPTIONS: dict[JobKind, type[AnyOptions]] = {
@@ -47,7 +47,7 @@ def seeded(options: AnyOptions) -> AnyOptions:
     return options.model_copy(update={"seed": secrets.randbelow(2**31)})
 
 
-# Who asked for a job, where nobody did.
+# The actor of a job that a schedule submitted.
 SCHEDULE = "schedule"
 
 
@@ -141,7 +141,7 @@ class Task(JobInput):
     last_views: dict[str, View] = {}
     # By camera: what the engine keeps of its earlier nights.
     memories: dict[str, dict[str, Any]] = {}
-    # When the frames were taken; nobody says so yet, and they are taken to be as old as their upload.
+    # The time of the frames, which counts as that of their upload: clients cannot say it yet.
     taken_at: datetime | None = None
     # By camera: the pose that its movement is counted from, of those that have one.
     anchors: dict[str, Anchor] = {}

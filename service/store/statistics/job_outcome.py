@@ -14,7 +14,7 @@ from service.store.statistics.counters import DURATION, STAGE, STITCH_ERROR, WAI
 
 # As in `timings_s` of a result.
 STAGES = ("decode", "view", "segmentation", "evolution", "refinement", "quality", "preview")
-# What can end a job. A program of jobs may say something else: that is `other`.
+# Errors that can end a job; any other that a job program may report counts as `other`.
 ERRORS = (
     "broken-image",
     "frame-size",
@@ -36,7 +36,7 @@ OUTCOMES = (
     *(("failed", "", error) for error in ERRORS),
 )
 ENDED = "jobs_ended"
-# Of other kinds than calibrations: the kind and the status.
+# Counter of the ends of other kinds than calibrations, by kind and status.
 OTHERS_ENDED = "other_jobs_ended"
 OTHER_OUTCOMES = tuple(
     (kind, status)
@@ -45,7 +45,7 @@ OTHER_OUTCOMES = tuple(
     for status in ("succeeded", "failed", "cancelled")
 )
 RESTARTS = "job_restarts"
-# Of the cameras of calibrations: usable, or why not.
+# Counter of the view conditions of cameras in calibrations: usable, or why not.
 VIEWS = "views"
 USABLE = "usable"
 VIEW_CONDITIONS = (USABLE, *get_args(Cause))

@@ -12,7 +12,7 @@ from service.store.statistics import counters
 from service.store.statistics.counters import HistogramBuckets
 
 FETCH = HistogramBuckets("source_fetch", (0.1, 0.25, 0.5, 1, 2, 4, 8, 15, 30, 60, 120))
-# What came: a frame, or none.
+# The outcomes of a fetch.
 FRAME, NONE = "frame", "none"
 log = structlog.get_logger()
 

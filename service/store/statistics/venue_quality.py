@@ -157,5 +157,5 @@ def update_quality(connection: sa.Connection, venue_id: str | None) -> Iterator[
     if stored is not None:
         connection.execute(sa.update(tables.venue_quality).where(q.venue == venue_id).values(**values))
     elif connection.scalar(sa.select(v.id).where(v.id == venue_id)) is not None:
-        # Of a venue that was deleted meanwhile nothing is stored.
+        # Nothing is stored of a venue that was deleted meanwhile.
         connection.execute(sa.insert(tables.venue_quality).values(venue=venue_id, **values))
