@@ -85,7 +85,7 @@ class ExpiryRepository(Repository):
         with writing(self._engine) as connection:
             advisory_lock(connection, "expiry")
             self._mark(connection, job_ids, frames_deleted_at=now)
-            leave(connection, [frame_folder(job_id) for job_id in job_ids], now)
+            schedule_deletion(connection, [frame_folder(job_id) for job_id in job_ids], now)
 
     def expire_pictures(self, ended_before: datetime, now: datetime, limit: int) -> int:
         """Let ended jobs have no pictures, but for the last accepted job of each venue; return their number."""
@@ -93,7 +93,7 @@ class ExpiryRepository(Repository):
             advisory_lock(connection, "expiry")
             ids = self._ended(connection, ended_before, limit, j.pictures_deleted_at.is_(None), NOT_THE_LAST_ACCEPTED)
             self._mark(connection, ids, pictures_deleted_at=now)
-            leave(connection, [pictures_folder(job_id) for job_id in ids], now)
+            schedule_deletion(connection, [pictures_folder(job_id) for job_id in ids], now)
             return len(ids)
 
     def old_jobs(self, ended_before: datetime, limit: int) -> list[str]:
@@ -181,7 +181,9 @@ class ExpiryRepository(Repository):
             advisory_lock(connection, "expiry")
             connection.execute(sa.delete(tables.jobs).where(j.id.in_(job_ids), j.finished_at.is_not(None)))
             connection.execute(sa.delete(tables.deliveries).where(tables.deliveries.c.id.in_(job_ids)))
-            leave(connection, [of(job_id) for job_id in job_ids for of in (frame_folder, pictures_folder)], now)
+            schedule_deletion(
+                connection, [of(job_id) for job_id in job_ids for of in (frame_folder, pictures_folder)], now
+            )
 
     def leftovers(self, now: datetime, limit: int) -> list[str]:
         """Return up to `limit` folders whose files are to be deleted."""
@@ -211,7 +213,7 @@ class ExpiryRepository(Repository):
         connection.execute(marked)
 
 
-def leave(connection: sa.Connection, folders: Collection[str], due_at: datetime) -> None:
+def schedule_deletion(connection: sa.Connection, folders: Collection[str], due_at: datetime) -> None:
     """Schedule the deletion of the files of folders, inside the caller's transaction."""
     connection.execute(sa.delete(tables.leftovers).where(left.folder.in_(folders)))
     rows = [{"folder": folder, "due_at": due_at} for folder in folders]

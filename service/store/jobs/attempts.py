@@ -23,7 +23,7 @@ from service.schemas.venue import Venue
 from service.store import tables
 from service.store.alarms import update_alarms
 from service.store.database import Repository, advisory_lock, clock, reading, writing
-from service.store.jobs.ending import Still, changed, end_job, still_open
+from service.store.jobs.ending import RowConditions, changed, end_job, still_open
 from service.store.jobs.queries import ONE, job_input_values
 from service.store.jobs.task import Task, UnreadableJob, parse_job_input
 from service.store.memories import Memories, newest_memories
@@ -182,15 +182,15 @@ class AttemptRepository(Repository):
     def abandon(self, job_id: str, error: JobError, seconds: float) -> bool:
         """End an open job that the queue has given up; False if it has ended or was heard of meanwhile."""
         with writing(self._engine) as connection:
-            still = [*still_open(job_id), unheard_for(seconds, clock(connection))]
-            return end_without_result(connection, job_id, still, error)
+            conditions = [*still_open(job_id), unheard_for(seconds, clock(connection))]
+            return end_without_result(connection, job_id, conditions, error)
 
 
-def _fence(task: Task) -> Still:
+def _fence(task: Task) -> RowConditions:
     return [j.id == task.job_id, j.run_token == task.run_token, j.status == "running"]
 
 
-def _fences(tasks: Collection[Task]) -> Still:
+def _fences(tasks: Collection[Task]) -> RowConditions:
     # Tokens are of one attempt each; the ids are what the index is by.
     tokens = [task.run_token for task in tasks]
     return [j.id.in_([task.job_id for task in tasks]), j.run_token.in_(tokens), j.status == "running"]
@@ -209,9 +209,9 @@ def _progress_columns(progress: Mapping[str, Progress]) -> dict[str, sa.ColumnEl
     }
 
 
-def _locked(connection: sa.Connection, still: Still) -> bool:
+def _locked(connection: sa.Connection, conditions: RowConditions) -> bool:
     """Lock the row of a job; True if conditions hold: a cancellation comes before an end or after it, not within."""
-    return connection.scalar(sa.select(j.id).where(*still).with_for_update()) is not None
+    return connection.scalar(sa.select(j.id).where(*conditions).with_for_update()) is not None
 
 
 def _move_poses(
@@ -241,20 +241,20 @@ def _move_poses(
     return result
 
 
-def end_without_result(connection: sa.Connection, job_id: str, still: Still, error: JobError) -> bool:
-    """Fail a job inside the caller's transaction; False, and nothing is done, if the row is not `still` so."""
+def end_without_result(connection: sa.Connection, job_id: str, conditions: RowConditions, error: JobError) -> bool:
+    """Fail a job inside the caller's transaction; False, and nothing is done, unless the row meets the conditions."""
     row = connection.execute(sa.select(j.kind, j.venue, j.options).where(j.id == job_id)).one()
     misses = row.kind == "calibration" and not row.options["dry_run"]
     if row.venue is not None:
         advisory_lock(connection, venue_lock(row.venue))
-    if not _locked(connection, still):
+    if not _locked(connection, conditions):
         return False
     venue = find_readable(connection, row.venue) if misses else None
     with update_quality(connection, row.venue) as quality:
         if venue is not None:
             # Alarms are counted before ends wherever both are, so that no two transactions wait for each other.
             _miss(connection, quality, venue)
-        return end_job(connection, job_id, still, "failed", quality, error=error)
+        return end_job(connection, job_id, conditions, "failed", quality, error=error)
 
 
 def _miss(connection: sa.Connection, quality: VenueQuality, venue: Venue) -> None:

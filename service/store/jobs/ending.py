@@ -29,7 +29,7 @@ from service.store.statistics.venue_quality import VenueQuality
 from service.store.unreadable import read_or
 
 # Conditions that a row must still meet when it is written.
-Still = list[sa.ColumnElement[bool]]
+RowConditions = list[sa.ColumnElement[bool]]
 j = tables.jobs.c
 v = tables.venues.c
 
@@ -37,7 +37,7 @@ v = tables.venues.c
 def end_job(
     connection: sa.Connection,
     job_id: str,
-    still: Still,
+    conditions: RowConditions,
     status: JobStatus,
     quality: VenueQuality,
     *,
@@ -46,7 +46,7 @@ def end_job(
     by: Actor | None = None,
     **values: Any,
 ) -> bool:
-    """End a job with its event, callback and counters; False, and nothing is done, if the row is not `still` so.
+    """End a job with its event, callback and counters; False, and nothing is done, unless the row meets the conditions.
 
     `quality`: that of its venue. `by`: who ended it; None: it ended by itself.
     """
@@ -57,7 +57,7 @@ def end_job(
         values["error"] = to_document(error)
     # Only the webhooks of the venue are read.
     webhooks = sa.select(v.document["webhooks"]).where(v.id == j.venue).scalar_subquery().label("webhooks")
-    ended = sa.update(tables.jobs).where(*still).values(status=status, finished_at=now, **values, **changed(now))
+    ended = sa.update(tables.jobs).where(*conditions).values(status=status, finished_at=now, **values, **changed(now))
     told_of = (j.kind, j.venue, j.options, j.created_at, j.started_at, j.attempt, webhooks)
     row = connection.execute(ended.returning(*told_of)).one_or_none()
     if row is None:
@@ -80,7 +80,7 @@ def _webhooks_in(documents: Any) -> list[Webhook]:
     return [Webhook.model_validate(webhook, **TOLERANTLY) for webhook in documents or ()]
 
 
-def still_open(job_id: str) -> Still:
+def still_open(job_id: str) -> RowConditions:
     """Return the conditions under which a job is queued or running."""
     return [j.id == job_id, j.status.in_(OPEN_STATUSES)]
 

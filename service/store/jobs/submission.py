@@ -16,7 +16,7 @@ from service.store import tables
 from service.store.database import Repository, advisory_lock, clock, reading, writing
 from service.store.documents import to_document
 from service.store.events.event_log import add_queued_event
-from service.store.expiry import leave
+from service.store.expiry import schedule_deletion
 from service.store.jobs.attempts import Enqueue, end_without_result
 from service.store.jobs.files import frame_folder
 from service.store.jobs.queries import ONE, job_input_values, read_job
@@ -106,7 +106,7 @@ class SubmissionRepository(Repository):
             if same is not None:
                 return read_job(connection, same)
             _require_place(connection, _waiting(connection), queue_limit, is_schedule=submission.origin.is_schedule)
-            leave(connection, [frame_folder(submission.job_id)], clock(connection) + grace)
+            schedule_deletion(connection, [frame_folder(submission.job_id)], clock(connection) + grace)
             return None
 
     def submit(self, submission: Submission, queue_limit: int, enqueue: Enqueue) -> tuple[Job, bool]:
