@@ -25,17 +25,17 @@ from service.control_charts import (
 )
 from service.schemas.trend import Chart, Quantity, Trend, TrendPoint, TrendState
 
+# The shift at the far touchline that is an alarm, where the venue says nothing else.
 ALARM_M = 0.05
-"""At the far touchline: what a shift amounts to that is an alarm, where the venue says nothing else."""
+# With fewer nights no chart can exceed its limits, however far a camera moves: the spread of three includes the move.
 NIGHTS_TO_JUDGE = 4
-"""With fewer no chart can ring, however far a camera moves: of three, the spread has the night that moved in it."""
 Rows = Sequence[Any]
+# The column of each quantity, and that of its repeatability.
 QUANTITIES: Mapping[Quantity, tuple[str, str]] = {
     "across": ("across_m", "repeatability_across_m"),
     "away": ("away_m", "repeatability_away_m"),
     "focal-length": ("focal_length", "sigma_focal_length"),
 }
-"""The column of each, and that of how well it repeats."""
 
 
 @dataclass(frozen=True)
@@ -54,8 +54,7 @@ class Series:
 
     def mean(self, number: int) -> float:
         """Return the moving average beside the baseline after a night, in the quantity's own unit."""
-        known = (n for n in range(number, -1, -1) if self.points[n] is not None)
-        last = next(known, None)
+        last = next((n for n in range(number, -1, -1) if self.points[n] is not None), None)
         if last is None:
             return 0.0
         night, point = self.nights[last], self.points[last]
@@ -101,8 +100,7 @@ class CameraCharts:
 
     def cusum(self, number: int) -> float:
         """Return the largest cumulative sum of all quantities after a night."""
-        known = [last for series in self.series if (last := series.last(number)) is not None]
-        return max((max(point.high, point.low) for point in known), default=0.0)
+        return max((max(point.high, point.low) for point in _last_points(self.series, number)), default=0.0)
 
     def state(self, number: int, alarm_m: float) -> TrendState:
         """Return the state of the camera after a night."""
@@ -139,23 +137,22 @@ class CameraCharts:
             )
         of_pose = [series for series in beyond if series.quantity != "focal-length"]
         of_lens = [series for series in beyond if series.quantity == "focal-length"]
-        told = []
+        findings = []
         if of_pose:
             across, away = self.series[0].mean(number), self.series[1].mean(number)
-            told.append(f"moved {_cm(hypot(across, away))} at the far touchline {self._since(of_pose)}")
+            findings.append(f"moved {_cm(hypot(across, away))} at the far touchline {self._since(of_pose)}")
         for series in of_lens:
             longer = series.mean(number)
             moves_m = abs(longer) * self.nights[number][-1].focal_length_m
             by = f"{abs(longer):.2%} {'longer' if longer > 0 else 'shorter'}"
-            told.append(f"has a focal length {by} {self._since([series])}, {_cm(moves_m)} at the far touchline")
-        return (
-            f"Camera {camera} {' and '.join(told)}: beyond what its own spread explains ({self._which_charts(beyond)})."
-        )
+            findings.append(f"has a focal length {by} {self._since([series])}, {_cm(moves_m)} at the far touchline")
+        charts = self._which_charts(beyond)
+        return f"Camera {camera} {' and '.join(findings)}: beyond what its own spread explains ({charts})."
 
     def trend(self, venue: str, camera: str, anchor: int, alarm_m: float, since: datetime | None) -> Trend:
         """Return the whole trend; `since`: without the nights before that."""
         number = len(self.nights) - 1
-        told = [n for n, rows in enumerate(self.nights) if since is None or rows[-1].at >= since]
+        shown = [n for n, rows in enumerate(self.nights) if since is None or rows[-1].at >= since]
         return Trend(
             venue=venue,
             camera=camera,
@@ -166,17 +163,16 @@ class CameraCharts:
             alarm_m=alarm_m,
             moved_m=self.moved_m(number),
             baseline_nights=min(number + 1, NIGHTS_OF_BASELINE),
-            points=[self._point(n, alarm_m) for n in told],
+            points=[self._point(n, alarm_m) for n in shown],
         )
 
     def _since(self, several: Sequence[Series]) -> str:
         """Return in words when the first of several quantities began to move."""
-        last = [series.last(len(self.nights) - 1) for series in several]
-        begun = [point.since for point in last if point is not None and point.since is not None]
+        begun = [point.since for point in _last_points(several, len(self.nights) - 1) if point.since is not None]
         return f"since {_date(self.nights[min(begun, default=0)][0].at)}"
 
     def _which_charts(self, beyond: Sequence[Series]) -> str:
-        last = [point for series in beyond if (point := series.last(len(self.nights) - 1)) is not None]
+        last = _last_points(beyond, len(self.nights) - 1)
         names = (("EWMA", any(p.is_beyond_ewma for p in last)), ("CUSUM", any(p.is_beyond_cusum for p in last)))
         return " and ".join(name for name, rings in names if rings)
 
@@ -199,12 +195,14 @@ class CameraCharts:
             focal_length=_mean(rows, "focal_length"),
             sigma_focal_length=_median(rows, "sigma_focal_length"),
             charts=[
-                chart
-                for series in self.series
-                if (chart := _chart(series, number, rows[-1].focal_length_m)) is not None
+                chart for one in self.series if (chart := _chart(one, number, rows[-1].focal_length_m)) is not None
             ],
             state=self.state(number, alarm_m),
         )
+
+
+def _last_points(several: Sequence[Series], number: int) -> list[ChartPoint]:
+    return [point for series in several if (point := series.last(number)) is not None]
 
 
 def state_of(*, beyond: bool, moved_m: float, alarm_m: float) -> TrendState:

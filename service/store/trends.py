@@ -24,8 +24,8 @@ from service.store.documents import to_document
 from service.store.trend_charts import ALARM_M, CameraCharts, state_of
 from service.store.unreadable import read_or, read_values
 
+# The rows of each camera: three years of nights.
 KEPT_ROWS = 1100
-"""Of each camera: three years of nights."""
 c = tables.camera_anchors.c
 t = tables.camera_trend.c
 
