@@ -17,7 +17,7 @@ from service.schemas.history import Revision, RevisionCamera
 from service.schemas.venue import Venue
 from service.store import live_alarms, tables
 from service.store.events.event_log import add_event
-from service.store.events.outbox import add_event_delivery
+from service.store.events.outbox import add_delivery
 from service.store.live_alarms import AlarmKey
 from service.store.revisions import CALIBRATION_CAUSES, newest_known, newest_revision, revision_at
 from service.store.schedules import schedule_of
@@ -208,7 +208,7 @@ def _add_alarm_event(connection: sa.Connection, venue: Venue, what: str, alarm: 
     data = VenueAlarm(venue=venue.id, **alarm.model_dump())
     event = add_event(connection, venue.id, venue.webhooks, what, data, at)
     if venue.alarms is not None and venue.alarms.callback_url is not None:
-        add_event_delivery(connection, event, venue.alarms.callback_url, at)
+        add_delivery(connection, venue.alarms.callback_url, at, event=event)
 
 
 def _alarm_row(venue_id: str, key: AlarmKey) -> list[sa.ColumnElement[bool]]:

@@ -127,16 +127,12 @@ def _write(connection: sa.Connection, delivery: Delivery, **values: datetime | s
     return connection.execute(sa.update(tables.deliveries).where(*this_attempt).values(**values)).rowcount == 1
 
 
-def add_delivery(connection: sa.Connection, job_id: str, url: str, now: datetime) -> None:
-    """Add the delivery of the end of a job to `url`, inside the caller's transaction."""
-    told = {"id": job_id, "url": url, "receiver": _receiver(url), "status": "waiting", "due_at": now}
-    connection.execute(sa.insert(tables.deliveries).values(**told))
-
-
-def add_event_delivery(connection: sa.Connection, event: int, url: str, now: datetime) -> None:
-    """Add the delivery of an event to `url`, inside the caller's transaction."""
-    told = {"id": new_id(), "url": url, "receiver": _receiver(url), "status": "waiting", "due_at": now}
-    connection.execute(sa.insert(tables.deliveries).values(event=event, **told))
+def add_delivery(
+    connection: sa.Connection, url: str, now: datetime, *, job: str | None = None, event: int | None = None
+) -> None:
+    """Add the delivery of an event, or of the end of a job, to `url`, inside the caller's transaction."""
+    values = {"id": job or new_id(), "url": url, "receiver": _receiver(url), "status": "waiting", "due_at": now}
+    connection.execute(sa.insert(tables.deliveries).values(event=event, **values))
 
 
 def deliveries_of(connection: sa.Connection, job_ids: Collection[str]) -> dict[str, CallbackState]:

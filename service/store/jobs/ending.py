@@ -20,7 +20,7 @@ from service.schemas.options import Options
 from service.schemas.results import AnyResult
 from service.store import tables
 from service.store.documents import to_document
-from service.store.events.event_log import add_job_event
+from service.store.events.event_log import add_event
 from service.store.events.outbox import add_delivery
 from service.store.jobs.task import stored_options
 from service.store.statistics import counters
@@ -56,21 +56,21 @@ def end_job(
     if error is not None:
         values["error"] = to_document(error)
     # Only the webhooks of the venue are read.
-    webhooks = sa.select(v.document["webhooks"]).where(v.id == j.venue).scalar_subquery().label("webhooks")
+    of_venue = sa.select(v.document["webhooks"]).where(v.id == j.venue).scalar_subquery().label("webhooks")
     ended = sa.update(tables.jobs).where(*conditions).values(status=status, finished_at=now, **values, **changed(now))
-    told_of = (j.kind, j.venue, j.options, j.created_at, j.started_at, j.attempt, webhooks)
-    row = connection.execute(ended.returning(*told_of)).one_or_none()
+    columns = (j.kind, j.venue, j.options, j.created_at, j.started_at, j.attempt, of_venue)
+    row = connection.execute(ended.returning(*columns)).one_or_none()
     if row is None:
         return False
     options = stored_options(row.kind, row.options)
     if isinstance(options, Options):
         quality.ended(status, result, dry_run=options.dry_run)
     if row.venue is not None:
-        nobody: list[Webhook] = []
-        told = read_or(nobody, "venue", row.venue, partial(_webhooks_in, row.webhooks))
-        add_job_event(connection, row.venue, told, f"job.{status}", job_id, now, by)
+        none: list[Webhook] = []
+        webhooks = read_or(none, "venue", row.venue, partial(_webhooks_in, row.webhooks))
+        add_event(connection, row.venue, webhooks, f"job.{status}", None, now, by, job_id)
     if options.callback_url is not None:
-        add_delivery(connection, job_id, options.callback_url, now)
+        add_delivery(connection, options.callback_url, now, job=job_id)
     ending = JobOutcome(row.kind, status, result, error, row.created_at, row.started_at, now, row.attempt)
     counters.add(connection, ending.tallies())
     return True
