@@ -277,7 +277,7 @@ def _workers(workers: list[WorkerHeartbeat], silence_s: float) -> Iterator[Metri
     )
     age = GaugeMetricFamily("esc_worker_heartbeat_age_seconds", "Since its last one.", labels=["worker"])
     model = InfoMetricFamily("esc_worker_model", "Its network; empty: missing.", labels=["worker"])
-    builds = InfoMetricFamily("esc_worker_build", "Its version.", labels=["worker"])
+    builds = InfoMetricFamily("esc_worker_build", "Its version; empty: 0.1.0.", labels=["worker"])
     unreadable = GaugeMetricFamily(
         "esc_worker_unreadable_jobs",
         "Jobs that wait and that it cannot read: a newer version wrote them. They need a worker of that version.",

@@ -11,7 +11,7 @@ from service.schemas.base import Schema
 # To whoever may not know which.
 ANOTHER_KEY = "another key"
 # Of what happens to a venue.
-BY = "Who did it; null: the service by itself."
+BY = "Who did it; null: the service by itself, or before 0.2.0."
 
 
 class Actor(Schema):

@@ -180,7 +180,7 @@ def _begin_sqlite(connection: sa.Connection) -> None:
 
 @contextmanager
 def reading(engine: sa.Engine) -> Iterator[sa.Connection]:
-    """Open a transaction that sees one state of the database and takes no lock."""
+    """A transaction that sees one state of the database and takes no lock."""
     with engine.connect().execution_options(**SNAPSHOT[engine.dialect.name]) as connection, connection.begin():
         yield connection
 

@@ -228,14 +228,14 @@ def _move_poses(
         if not result.accepted_cameras:
             return result
         return result.refused("the venue was changed while the job ran", "venue-changed")
-    accepted = [] if task.options.dry_run else result.accepted_cameras
-    quality.calibrated(result, moved=bool(accepted))
-    if accepted:
-        quality.missed(stored.venue.poses.keys() - accepted)
-        with_this_job = {camera: memory for camera, memory in memories.items() if camera in accepted}
+    held = [] if task.options.dry_run else result.accepted_cameras
+    quality.calibrated(result, moved=bool(held))
+    if held:
+        quality.missed(stored.venue.poses.keys() - held)
+        with_this_job = {camera: memory for camera, memory in memories.items() if camera in held}
         known = {**newest_memories(connection, task.venue.id), **with_this_job}
         cause: Cause = "recovered" if result.recovered_cameras else "calibrated"
-        apply_result(connection, quality, stored, result, accepted, cause, task.job_id, known, task.origin.actor)
+        apply_result(connection, quality, stored, result, held, cause, task.job_id, known, task.origin.actor)
     elif not task.options.dry_run:
         _miss(connection, quality, stored.venue)
     return result

@@ -82,7 +82,7 @@ class VenueStored(SubmissionRefused):
 
 
 class QueueFull(SubmissionRefused):
-    """Raised while the queue is full."""
+    """As many jobs wait as may."""
 
     def __init__(self, waiting: int, kept: int) -> None:
         """`waiting`: the jobs that wait; `kept`: the places that are kept for schedules that are due."""

@@ -91,6 +91,7 @@ def test_the_frames_of_a_job_of_a_newer_version_are_not_submitted_again_otherwis
 
 
 def test_a_job_that_a_worker_broke_off_before_it_began_is_put_back(start, begin):
+    """As one of 0.1.0 does with a job that it cannot read."""
     service = start("serve")
     broken = service.submitted(service.venue("broken"))
     with service.database() as connection:
