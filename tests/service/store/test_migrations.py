@@ -240,12 +240,12 @@ def test_an_upgraded_database_takes_new_rows(upgraded, revision):
         assert (task.venue, task.options) == (submission.venue, submission.options)
     # Numbers go on where those of the old rows ended.
     moved = Pose.from_position(VENUE.cameras[0].pose.rotation, [0.0, -50.0, 9.0])
-    stores.venues.put(VENUE.with_poses({"left": moved}), lambda _: None)
+    stores.venues.put(VENUE.with_poses({"left": moved}))
     held = stores.venues.history(VENUE.id, None, 10)
     assert [(revision.revision, revision.cause) for revision in held] == [(3, "put"), (2, "calibrated"), (1, "put")]
     # What was never measured is not made up; what comes now is.
     assert [revision.cameras[0].moved is None for revision in held] == [False, True, True]
-    stores.venues.restore(VENUE.id, 1, lambda _: None)
+    stores.venues.restore(VENUE.id, 1)
     assert stores.venues.get(VENUE.id).cameras[0].pose == FIRST_POSE
     key = stores.keys.add("guest", "read", NOON + timedelta(days=36500))
     assert key.startswith("esc_")
