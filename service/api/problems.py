@@ -114,7 +114,7 @@ def _from_http(request: Request, error: HTTPException) -> Problem:
             return Problem("not-found", f"Nothing is at {request.url.path}; /docs lists what there is.")
         case 405:
             allowed = ", ".join(sorted(_methods_at(request)))
-            return Problem("method-not-allowed", f"Here work {allowed}.", headers={"Allow": allowed})
+            return Problem("method-not-allowed", f"Allowed methods: {allowed}.", headers={"Allow": allowed})
         case 413:
             return Problem("body-too-large", str(error.detail), headers=error.headers)
         case _:

@@ -62,8 +62,8 @@ class RequestLog:
         method = scope["method"] if scope["method"] in METHODS else "other"
         self._metrics.requests.labels(method, route, status).inc()
         # An answer that waits for a job's end would hide how fast the others are.
-        held = "?wait" if route == "/jobs/{job_id}" and "wait" in QueryParams(scope["query_string"]) else ""
-        self._metrics.seconds.labels(method, route + held).observe(seconds)
+        suffix = "?wait" if route == "/jobs/{job_id}" and "wait" in QueryParams(scope["query_string"]) else ""
+        self._metrics.seconds.labels(method, route + suffix).observe(seconds)
         say = log.debug if is_quiet(scope) else log.info
         asked = {"method": scope["method"], "path": scope["path"], "address": origin.address}
         say("request", **asked, status=status, seconds=round(seconds, 4))

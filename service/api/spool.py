@@ -68,8 +68,8 @@ class SpooledFile:
 
     def read(self, size: int = -1) -> bytes:
         """Return up to `size` bytes from where the last read ended; -1: all of the rest."""
-        left = self._length - self._position
-        data = self._spool.read(self._start + self._position, left if size < 0 else min(size, left))
+        rest = self._length - self._position
+        data = self._spool.read(self._start + self._position, rest if size < 0 else min(size, rest))
         self._position += len(data)
         return data
 

@@ -56,7 +56,6 @@ async def find(venue_id: VenueIdPath, request: Request, context: InContext, send
     The result has candidates of each camera with pose and lens, and `candidate/{camera}/{number}.jpg` shows them.
     Nothing is stored by itself: `POST /venues/{id}/adopt-found` creates the venue or moves its cameras.
     """
-    forms.require_form(request)
     await run_in_threadpool(forms.require_disk_space, context)
     await run_in_threadpool(job_submission.require_queue_room, context, venue_id, "find", sender)
     most = MOST_CAMERAS * context.settings.max_frames_per_camera

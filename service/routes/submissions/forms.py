@@ -11,6 +11,7 @@ from fastapi import Request
 from pydantic import ValidationError
 from starlette.datastructures import FormData, UploadFile
 
+from service.api.body_limit import is_form
 from service.api.context import Context
 from service.api.problems import validation_problem
 from service.api.spool import Spool, parsed_form
@@ -31,12 +32,6 @@ Chosen = TypeVar("Chosen", bound=Handling)
 Document = TypeVar("Document", bound=Schema)
 
 
-def require_form(request: Request) -> None:
-    """Refuse what is no form before it is read."""
-    if not request.headers.get("content-type", "").lower().startswith("multipart/form-data"):
-        raise Problem("not-multipart", "Send each picture as a file part of a form, as curl -F does.")
-
-
 def is_empty(request: Request) -> bool:
     """True if a request has no body."""
     return request.headers.get("content-length", "0") == "0" and "transfer-encoding" not in request.headers
@@ -48,7 +43,7 @@ def has_no_frames(form: FormData) -> bool:
 
 
 def require_disk_space(context: Context) -> None:
-    """Refuse an upload that would fill the disk before it is read."""
+    """Raise the problem `disk-full` for an upload that would fill the disk, before it is read."""
     if context.disk.is_short():
         raise Problem(
             "disk-full",
@@ -71,8 +66,10 @@ def venue_for_upload(context: Context, venue_id: str) -> Venue:
 async def parsed_upload(request: Request, context: Context, most_files: int) -> AsyncIterator[FormData]:
     """Yield the form of a request, with so many files at most; a few too many get the answer that names them.
 
-    Its files are on the disk; `context.uploads.content` reads one.
+    Its files are on the disk; `context.uploads.content` reads one. Raises a problem before it reads what is no form.
     """
+    if not is_form(request):
+        raise Problem("not-multipart", "Send each picture as a file part of a form, as curl -F does.")
     files = most_files + PARTS_TOO_MANY
     with context.uploads.admitted(request), Spool() as spool:
         yield await parsed_form(request, spool, files, PARTS_TOO_MANY, LONGEST_OPTIONS)

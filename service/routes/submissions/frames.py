@@ -56,7 +56,6 @@ async def fit_field(venue_id: VenueIdPath, request: Request, context: InContext,
 async def _uploaded(
     model: type[Options | FieldOptions], venue_id: str, request: Request, context: Context, sender: Sender
 ) -> Response:
-    forms.require_form(request)
     stored = await run_in_threadpool(forms.venue_for_upload, context, venue_id)
     kind: JobKind = "calibration" if model is Options else "field"
     await run_in_threadpool(job_submission.require_queue_room, context, stored.id, kind, sender)

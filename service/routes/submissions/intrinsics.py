@@ -43,7 +43,6 @@ async def intrinsics(
     sender: FromSender,
 ) -> Response:
     """Submit photos of a board, from which a job finds the lens. Its picture `coverage.jpg` shows what it rests on."""
-    forms.require_form(request)
     await run_in_threadpool(forms.require_disk_space, context)
     await run_in_threadpool(job_submission.require_queue_room, context, None, "intrinsics", sender)
     async with forms.parsed_upload(request, context, context.settings.max_photos) as form:

@@ -53,7 +53,6 @@ async def locate(
 
     The job takes about a second and waits for no calibration; with `wait` the answer is its end.
     """
-    forms.require_form(request)
     stored = await run_in_threadpool(forms.venue_for_upload, context, venue_id)
     await run_in_threadpool(job_submission.require_queue_room, context, stored.id, "locate", sender)
     async with forms.parsed_upload(request, context, 1) as form:
