@@ -11,7 +11,7 @@ from service.store import tables, unreadable
 from service.store.unreadable import UnreadableRow
 from tests.e2e.running import venue
 from tests.homes import in_both_homes
-from tests.service.serving_in_process import InProcess
+from tests.service.local_service import LocalService
 from tests.worker.stock import result
 from worker.duties.alarms import AlarmTimer
 
@@ -23,9 +23,8 @@ WATCHED = {"alarms": {"not_calibrated_for_h": 1}}
 def service(stock, monkeypatch):
     # Other tests of this process have met rows of theirs.
     monkeypatch.setattr(unreadable, "_met", {})
-    service = InProcess(stock.settings)
-    yield service
-    service.close()
+    with LocalService(stock.settings) as service:
+        yield service
 
 
 @pytest.fixture
