@@ -1,4 +1,4 @@
-"""The HTTP front end: checks, stores, queues and answers. It computes nothing."""
+"""HTTP application: checks, stores, queues and answers. It computes nothing."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ log = structlog.get_logger()
 
 
 def create_app(settings: Settings) -> FastAPI:
-    """The application; brings the database up to date first."""
+    """Return the application, after the schema of the database was brought up to date."""
     context = Context(settings)
     app = documented.DocumentedApp(
         title="ESC",
@@ -91,9 +91,9 @@ def create_app(settings: Settings) -> FastAPI:
 async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     context: Context = app.state.context
     duties = (context.job_watch.run, context.venue_watch.run, context.live_watch.run, context.authenticator.run)
-    beside = [asyncio.create_task(duty()) for duty in duties]
+    tasks = [asyncio.create_task(duty()) for duty in duties]
     yield
-    for task in beside:
+    for task in tasks:
         task.cancel()
         with suppress(asyncio.CancelledError):
             await task
@@ -102,18 +102,18 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
 
 
 def _answer_outages(app: FastAPI) -> None:
-    """A database or a bucket that is away, or a full disk, is no mistake of the service: 503, try again."""
+    """Answer 503 while the database or the blob store is unavailable, or the disk is full."""
 
-    async def away(_: Request, error: Exception) -> Response:
-        log.error("storage is away", exc_info=error)
+    async def unavailable(_: Request, error: Exception) -> Response:
+        log.error("storage unavailable", exc_info=error)
         return problems.problem_response(Problem("unavailable", outage_reason(error), headers={"Retry-After": "5"}))
 
     async def no_room(request: Request, error: Exception) -> Response:
-        # Where an upload is spooled.
+        # The file system on which an upload is spooled is full.
         if isinstance(error, OSError) and error.errno in DISK_FULL:
-            return await away(request, error)
+            return await unavailable(request, error)
         raise error
 
     for error in (*DATABASE_OUTAGES, *BLOB_OUTAGES):
-        app.add_exception_handler(error, away)
+        app.add_exception_handler(error, unavailable)
     app.add_exception_handler(OSError, no_room)

@@ -1,4 +1,4 @@
-"""The home of a service: its database, its files and its queue, and what brings frames into them."""
+"""State of a service: its database, blob store and queue, and the intake of frames."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from service.settings import Settings
 from service.store.blobs import Blobs
 from service.store.repositories import Repositories
 
-# Somebody waits for the store: a client, who can come again, or the other folders of a round that deletes.
+# A client waits for the store, and can come again, or the other folders of a round of deletions wait.
 BLOB_PATIENCE_S = 10.0
 
 
 class ApplicationState(Repositories):
-    """The repositories, queue, blobs and intake of a service, held by each API process and each worker."""
+    """Repositories, queue, blob store and intake, one of each in every API process and worker."""
 
     def __init__(self, settings: Settings) -> None:
         super().__init__(settings.home_database_url)
@@ -30,6 +30,6 @@ class ApplicationState(Repositories):
         self.from_sources = FromSources(self.venues, self.submissions, self.snapshots, self.blobs, self.intake)
 
     def close(self) -> None:
-        """Let the database go."""
+        """Close the connections to the database."""
         self.queue.close()
         self.engine.dispose()

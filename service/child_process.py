@@ -1,4 +1,4 @@
-"""Child processes: they end with the one that started them, and those that read what strangers sent get no secrets."""
+"""Child processes: they end with their parent, and those that decode uploads get no secrets."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ HARMLESS_FROM = ("LC_", "LD_", "PYTHON", "SSL_CERT_", "CUDA_", "NVIDIA_", "ORT_"
 
 
 def for_child() -> dict[str, str]:
-    """What the parent adds to the environment of a child that shall end with it."""
+    """Return environment variables for a child that shall end with this process."""
     return {PARENT: str(os.getpid())}
 
 
 def memory_limit_mb() -> float | None:
-    """Return how much memory this decoder may take; None if its parent has not said."""
+    """Return the memory limit of this decoder in MB, None if its parent has set none."""
     return float(os.environ[MEMORY]) if MEMORY in os.environ else None
 
 
 def without_secrets(*also: str) -> dict[str, str]:
-    """The environment of a child that shall end with it and that decodes, in native code, what strangers sent.
+    """Return the environment of a child that decodes uploads in native code, and shall end with this process.
 
-    No password of a database, no secret that callbacks are signed with. `also`: how the names of others begin that it
-    needs, in capital letters.
+    It has no password of a database and no secret that callbacks are signed with. `also`: prefixes of the names of
+    further variables, in capital letters.
     """
     inherited = {
         name: value
@@ -61,7 +61,7 @@ def end_with_parent() -> None:
 
 
 def begin_decoder() -> None:
-    """Begin a program that decodes, in native code, what strangers sent: it ends with its parent, and cannot read it.
+    """Confine this process, which decodes uploads in native code: it ends with its parent and cannot read its memory.
 
     To be called before anything is read and before other threads are started.
     """

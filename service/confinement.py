@@ -1,4 +1,4 @@
-"""Processes of the same user are kept apart: services hide their memory, decoders lose their reach.
+"""Isolation of processes of the same user: services hide their memory, decoders cannot read that of others.
 
 The programs that decode what strangers sent run as the user of the API and the worker. Linux lets a process read the
 environment and the memory of another one of its user, and there are the secrets. Each half closes that by itself.
@@ -34,10 +34,10 @@ def hide_memory() -> None:
 
 
 def confine() -> bool:
-    """Bar this process from the memory of all that it did not start, and from Linux 6.12 on from sending them signals.
+    """Bar this process from the memory of others that it did not start, and from Linux 6.12 on from signalling them.
 
-    Says whether the kernel does it: Landlock came with Linux 5.13, and some containers forbid the call. It covers what
-    `hide_memory` cannot: the process that started the service, and one that has begun and not hidden yet. Root has
+    Returns True if the kernel does it: Landlock came with Linux 5.13, and some containers forbid the call. It covers
+    what `hide_memory` cannot: the process that started the service, and one that has begun and not hidden yet. Root has
     other ways. To be called before other threads are started, which are confined only if they come later.
     """
     if sys.platform != "linux":

@@ -1,4 +1,4 @@
-"""Running the API in this process, and beside it, for `esc up`, a worker that is kept alive."""
+"""API server in this process, and for `esc up` a worker process beside it that is kept alive."""
 
 from __future__ import annotations
 
@@ -29,37 +29,37 @@ from service.settings import Settings
 from service.store.keys import KeyRepository
 from service.worker_lock import REFUSED, AlreadyRunning, lock_worker
 
-# What open requests get to end in, and after them the worker.
+# Time for open requests to end, and after them for the worker.
 GRACE_S = 5
-# Between two starts of a worker: doubled as long as it dies young.
+# Pause between two starts of a worker: doubled as long as it dies young.
 RESTART_AFTER_S = 1.0
 RESTART_AT_LEAST_EVERY_S = 30.0
-YOUNG_S = 10.0
+MIN_HEALTHY_UPTIME_S = 10.0
 EVERYWHERE, EVERYWHERE_IPV4 = "::", "0.0.0.0"
 NO_SUCH_FAMILY = (errno.EAFNOSUPPORT, errno.EADDRNOTAVAIL)
-ACCEPTED_AT_ONCE, WAITING_AT_THE_DOOR = 32, 2048
-# Of uvicorn's ticks, ten a second.
-TICKS_PER_LOOK = 10
+ACCEPTED_AT_ONCE, LISTEN_BACKLOG = 32, 2048
+# Ticks of uvicorn, ten a second, between two looks at slow connections.
+TICKS_PER_CHECK = 10
 log = structlog.get_logger()
 
 
 class CannotListen(Exception):  # noqa: N818
-    """The address cannot or must not be used; the message says what to do."""
+    """Raised if the address cannot or must not be used; the message says what to do."""
 
 
 class _NoSuchFamily(CannotListen):
-    """The machine has no address of this version of IP."""
+    """Raised if the machine has no address of this version of IP."""
 
 
 def serve(settings: Settings, *, with_worker: bool) -> None:
     """Answer requests until SIGTERM or SIGINT."""
     if with_worker:
-        # Asked here, where somebody sees the answer; the worker itself holds the lock.
+        # Tried here, where somebody sees the answer; the worker itself holds the lock.
         lock_worker(settings).close()
     listeners = _listen(settings)
     tracing.configure("esc-api", socket.gethostname())
     app = create_app(settings)
-    _see_to_keys(settings, app.state.context.keys)
+    _require_keys_if_exposed(settings, app.state.context.keys)
     server = _Server(app, settings)
     # Uvicorn raises the signal again after its shutdown, which would end the process before the worker is stopped.
     for number in (signal.SIGTERM, signal.SIGINT):
@@ -77,8 +77,8 @@ def serve(settings: Settings, *, with_worker: bool) -> None:
         raise AlreadyRunning("The worker of this service cannot run; its last line above says why.")
 
 
-def _see_to_keys(settings: Settings, keys: KeyRepository) -> None:
-    """Nobody listens to the world by accident."""
+def _require_keys_if_exposed(settings: Settings, keys: KeyRepository) -> None:
+    """Raise `CannotListen` for a service without keys that other machines can reach, unless ESC_AUTH=off."""
     if settings.auth == "off":
         if keys.any():
             log.warning("there are keys, but ESC_AUTH=off: anyone may call")
@@ -108,7 +108,7 @@ def _listener(host: str, port: int) -> socket.socket:
         return socket.create_server(
             (host, port),
             family=socket.AF_INET6 if ":" in host else socket.AF_INET,
-            backlog=WAITING_AT_THE_DOOR,
+            backlog=LISTEN_BACKLOG,
         )
     except OSError as error:
         taken = " Does the service run already? --port chooses another." if error.errno == errno.EADDRINUSE else ""
@@ -120,12 +120,12 @@ def _listener(host: str, port: int) -> socket.socket:
 
 
 def _authority(host: str, port: int) -> str:
-    """Host and port as in a URL, where an IPv6 address is in brackets."""
+    """Return host and port as in a URL, with an IPv6 address in brackets."""
     return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
 
 
 class _Server(uvicorn.Server):
-    """Uvicorn, but clients have limits, and waiting ones are let go before it waits for open requests."""
+    """Uvicorn with limits for clients; on shutdown releases waiting ones before it waits for open requests."""
 
     def __init__(self, app: FastAPI, settings: Settings) -> None:
         super().__init__(
@@ -146,30 +146,30 @@ class _Server(uvicorn.Server):
         self._settings = settings
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
-        """Begin to answer."""
+        """Open the listeners."""
         await super().startup(sockets)
-        # asyncio lets no more wait at the door than it accepts at once.
+        # asyncio sets the backlog to the number that it accepts at once.
         for listener in sockets or ():
-            listener.listen(WAITING_AT_THE_DOOR)
+            listener.listen(LISTEN_BACKLOG)
 
     async def on_tick(self, counter: int) -> bool:
-        """What uvicorn does ten times a second."""
-        if counter % TICKS_PER_LOOK == 0:
+        """Close slow connections once a second; uvicorn calls this ten times a second."""
+        if counter % TICKS_PER_CHECK == 0:
             limits = self._settings.stall_timeout_s, self._settings.request_timeout_s
             close_slow_connections(self, asyncio.get_running_loop().time(), *limits)
         return await super().on_tick(counter)
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-        """Stop answering."""
+        """Release waiting clients and shut down."""
         self._context.release_waiters()
         await super().shutdown(sockets)
 
 
 class KeptWorker:
-    """A worker as a child process, started again when it dies, ended with this process in any case."""
+    """Worker in a child process that is started again when it dies, and ends with this process."""
 
     def __init__(self, settings: Settings, name_is_taken: Callable[[], bool]) -> None:
-        """`name_is_taken`: whether a worker of its name is alive that is not this one."""
+        """`name_is_taken` returns True if another worker of this name is alive."""
         self._settings = settings
         self._name_is_taken = name_is_taken
         self.refused = False
@@ -200,13 +200,13 @@ class KeptWorker:
         pause = RESTART_AFTER_S
         while not self._stopping.is_set():
             begun = time.monotonic()
-            self._live_once()
-            if time.monotonic() - begun > YOUNG_S:
+            self._run_once()
+            if time.monotonic() - begun > MIN_HEALTHY_UPTIME_S:
                 pause = RESTART_AFTER_S
             self._stopping.wait(pause)
             pause = min(2 * pause, RESTART_AT_LEAST_EVERY_S)
 
-    def _live_once(self) -> None:
+    def _run_once(self) -> None:
         try:
             self._process = self._start()
         except OSError as error:

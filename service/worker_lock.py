@@ -1,4 +1,4 @@
-"""The lock by which only one worker of a name runs on a folder, and what tells such places apart."""
+"""Lock by which only one worker of a name runs on a folder, and the identity of such a lock."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import IO
 
 from service.settings import Settings
 
-# What a worker ends with that cannot run, most often because another one has its name.
+# Exit status of a worker that cannot run, most often because another one has its name.
 REFUSED = 2
 # A service that was killed and is started again at once left its worker for a moment: the kernel ends it after that.
 ENDS_WITHIN_S, LOOK_EVERY_S = 2.0, 0.05
@@ -19,7 +19,7 @@ BOOT_ID = Path("/proc/sys/kernel/random/boot_id")
 
 
 class AlreadyRunning(Exception):  # noqa: N818
-    """A worker of this name runs already; the message says where, and what to do."""
+    """Raised if a worker of this name runs already; the message says where, and what to do."""
 
 
 def lock_worker(settings: Settings) -> IO[bytes]:
@@ -31,7 +31,7 @@ def lock_worker(settings: Settings) -> IO[bytes]:
     settings.data.mkdir(parents=True, exist_ok=True)
     lock = (settings.data / f"worker-{settings.worker_name}.lock").open("ab")
     until = time.monotonic() + ENDS_WITHIN_S
-    while not _is_taken(lock):
+    while not _try_lock(lock):
         if time.monotonic() > until:
             lock.close()
             raise AlreadyRunning(
@@ -43,8 +43,8 @@ def lock_worker(settings: Settings) -> IO[bytes]:
     return lock
 
 
-def _is_taken(lock: IO[bytes]) -> bool:
-    """Take a lock if nobody has it; whether it is taken now."""
+def _try_lock(lock: IO[bytes]) -> bool:
+    """Take a lock if nobody has it; True if it is taken now."""
     try:
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError:
@@ -53,7 +53,7 @@ def _is_taken(lock: IO[bytes]) -> bool:
 
 
 def lock_identity(lock: IO[bytes]) -> str:
-    """Name the place where a lock excludes all others: this file, as long as this machine runs."""
+    """Return an id of a lock file, which is the same for all processes of this machine until it restarts."""
     boot = BOOT_ID.read_text() if BOOT_ID.exists() else ""
     file = Path(lock.name).stat()
     return hashlib.sha256(f"{boot} {file.st_dev} {file.st_ino}".encode()).hexdigest()

@@ -3,6 +3,7 @@
 import importlib.util
 import itertools
 import os
+import re
 from pathlib import Path
 
 # One thread of BLAS, as the worker sets it, before NumPy is loaded, and one of the network: several only wait for each
@@ -166,3 +167,15 @@ def stock(home, tmp_path):
     yield stock
     stock.engine.dispose()
     home.give_back(tmp_path)
+
+
+@pytest.fixture
+def service(request, home):
+    """The service that tests share; what they leave in it is theirs by its name."""
+    return request.getfixturevalue("service_on_servers" if isinstance(home, Servers) else "service_of_a_folder")
+
+
+@pytest.fixture
+def name(request):
+    """A venue id of the test's own."""
+    return re.sub("[^a-z0-9]+", "-", request.node.name.lower())[-60:].strip("-")

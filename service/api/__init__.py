@@ -1,1 +1,1 @@
-"""What surrounds every request: who may ask, how often and how much, and how an answer looks."""
+"""Middleware and limits around every request: authentication, rates, sizes, and problems as answers."""

@@ -1,4 +1,4 @@
-"""Who may call, what, and how often: API keys, their scopes and their limits.
+"""Authentication of callers: API keys, their scopes and their rates.
 
 A program sends its key with each request. A person signs in with one: from then on the browser sends a cookie, and with
 what changes something the token that only our own pages can read (a page of another site could have the cookie sent
@@ -55,16 +55,17 @@ class _CachedKey:
     until: float
 
 
-def require_scope(key: Key | None, needed: Scope) -> None:
-    """Raise the problem that names the scope unless the key has it; None: where no keys are asked for."""
-    if key is not None and SCOPES.index(key.scope) < SCOPES.index(needed):
-        raise Problem(
-            "scope-too-small",
-            f"This needs a key of scope {needed}; {key.name} has {key.scope}.",
-            headers={"WWW-Authenticate": f'Bearer error="insufficient_scope", scope="{needed}"'},
-            expected=needed,
-            got=key.scope,
-        )
+def missing_scope(key: Key | None, needed: Scope) -> Problem | None:
+    """Return the problem of a key that lacks a scope; None if it has it, or the service asks for no keys."""
+    if key is None or SCOPES.index(key.scope) >= SCOPES.index(needed):
+        return None
+    return Problem(
+        "scope-too-small",
+        f"This needs a key of scope {needed}; {key.name} has {key.scope}.",
+        headers={"WWW-Authenticate": f'Bearer error="insufficient_scope", scope="{needed}"'},
+        expected=needed,
+        got=key.scope,
+    )
 
 
 class Authenticator:
@@ -82,19 +83,19 @@ class Authenticator:
         self._settings = settings
         self._clock = clock
         self._off = settings.auth == "off"
-        # Once on it stays on: who exchanges the only key must not leave the door open in between.
+        # Once on it stays on, or the service would be open while the only key is being exchanged.
         self._on = settings.listens_beyond_this_machine
         self._next_key_check_at = -math.inf
         self._cached_keys: dict[str, _CachedKey] = {}
         self._cached_sessions: dict[str, _CachedKey] = {}
-        # Hashes of cookies of no session, nor ever of one: pages that go on asking with an old one guess nothing.
+        # Hashes of cookies that belong to no session and never will: pages that go on sending an old one guess nothing.
         self._unknown_sessions: OrderedDict[str, None] = OrderedDict()
         self._uses: dict[str, datetime] = {}
         self._requests = TokenBuckets(settings.rate_per_s, settings.rate_burst, clock=clock)
         self._guesses = TokenBuckets(1 / GUESS_EVERY_S, GUESSES, clock=clock)
 
     async def admit(self, request: HTTPConnection, needed: Scope) -> Key | None:
-        """The caller's key, None where none is asked for; otherwise raises the problem that says why not."""
+        """Return the caller's key, None if the service asks for none; raises the problem that says why not."""
         if not await self.asks_for_keys():
             origins.check(request, self._settings)
             return None
@@ -102,11 +103,12 @@ class Authenticator:
         # Every line that the request leaves in the log.
         structlog.contextvars.bind_contextvars(key=key.name)
         self._count_request(key)
-        require_scope(key, needed)
+        if problem := missing_scope(key, needed):
+            raise problem
         return key
 
     async def sign_in(self, request: HTTPConnection, given: str) -> str:
-        """Begin a session with a key; returns what its cookie says."""
+        """Begin a session with a key; return the value of its cookie."""
         key = await self._of_bearer(given, _client_address(request))
         return await run_in_threadpool(self._sessions.begin, key, timedelta(hours=self._settings.session_hours))
 
@@ -117,13 +119,13 @@ class Authenticator:
         await run_in_threadpool(self._sessions.end, hash_)
 
     async def run(self) -> None:
-        """Write uses down, for as long as the service runs."""
+        """Write uses of keys to the database every minute, until cancelled."""
         while True:
             await asyncio.sleep(USES_WRITTEN_EVERY_S)
             await self.write_uses()
 
     async def write_uses(self) -> None:
-        """Write down which keys were used since the last time."""
+        """Write to the database which keys were used since the last call."""
         uses, self._uses = self._uses, {}
         if not uses:
             return
@@ -134,7 +136,7 @@ class Authenticator:
             self._uses = uses | self._uses
 
     async def asks_for_keys(self) -> bool:
-        """Whether callers need a key."""
+        """True if callers need a key."""
         if self._off:
             return False
         now = self._clock()
@@ -144,7 +146,7 @@ class Authenticator:
         return self._on
 
     async def _key(self, request: HTTPConnection) -> Key:
-        """The caller's key, as RFC 6750 has it sent and refused, or that of their session."""
+        """Return the caller's key from the bearer token (RFC 6750) or the session cookie."""
         scheme, _, given = request.headers.get("authorization", "").partition(" ")
         if scheme.lower() == "bearer" and given:
             return await self._of_bearer(given, _client_address(request))
@@ -185,7 +187,7 @@ class Authenticator:
         return _unexpired(await self._find_session(hash_))
 
     async def _find_session(self, hash_: str, guessed_from: str | None = None) -> Key:
-        """The key of a session; `guessed_from`: the address of who sends it for the first time."""
+        """Return the key of a session; `guessed_from`: the address of a client whose cookie was never seen before."""
         until = self._clock() + KEY_CACHED_FOR_S
         key = await run_in_threadpool(self._sessions.key_of, hash_)
         if key is None:
@@ -200,7 +202,7 @@ class Authenticator:
         return key
 
     async def _find_new(self, hash_: str, address: str) -> Key:
-        """As `_find`, but not too often. Keys seen before are not held up by what others try from their address."""
+        """Look up a key that was never seen before, as often as guesses from its address are allowed."""
         return await self._guessed(address, lambda: self._find(hash_, address))
 
     async def _guessed(self, address: str, find: Callable[[], Awaitable[Key]]) -> Key:
@@ -245,7 +247,7 @@ class Authenticator:
 
 
 def page_token(session_token: str) -> str:
-    """What a page of this session sends with everything that it changes."""
+    """Return the CSRF token of a session, which its pages send with every change."""
     return hashlib.sha256(f"page of {session_token}".encode()).hexdigest()
 
 
@@ -268,7 +270,7 @@ def _retry_after(wait_s: float) -> dict[str, str]:
 
 
 def _client_address(request: HTTPConnection) -> str:
-    """Where a request comes from; of IPv6 the network of 64 bits, which is what one customer has."""
+    """Return the address of the client; for IPv6 its network of 64 bits, which is what one customer has."""
     host = request.client.host if request.client else ""
     address = ip_of(host)
     if isinstance(address, ipaddress.IPv6Address):

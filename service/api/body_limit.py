@@ -1,4 +1,4 @@
-"""No request is larger than its kind may be, nor packed; the answer to one that is, is a problem like every other.
+"""Limits of the size of request bodies, and refusal of compressed ones.
 
 Files of a form are spooled to disk as they come. Any other body is held in memory, and parsed while everybody else
 waits: it may have a megabyte, which is more than a document needs. FastAPI's own limit answers a too large
@@ -57,7 +57,7 @@ class BodyLimit:
         await self._app(scope, counted, send)
 
     def _limit(self, request: Request) -> tuple[int, str]:
-        """How many bytes a body may have, and what to do about one that has more."""
+        """Return how many bytes a body may have, and what to do about a larger one."""
         if is_form(request):
             return self._largest_form, f"{self._largest_form} bytes are allowed; send fewer or smaller frames."
         largest = min(LARGEST_DOCUMENT, self._largest_form)
@@ -65,5 +65,5 @@ class BodyLimit:
 
 
 def is_form(request: Request) -> bool:
-    """Whether a request brings a form with files."""
+    """True if the body of a request is a form with files."""
     return request.headers.get("content-type", "").lower().startswith("multipart/form-data")

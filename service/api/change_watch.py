@@ -1,4 +1,4 @@
-"""Waiting for jobs and venues: one small query of each, a few times a second, for everybody who waits."""
+"""Waiting for changes of jobs and venues: one small query each, a few times a second, for all clients that wait."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ log = structlog.get_logger()
 class ChangeWatch(Generic[State]):
     """Wakes coroutines when a job or venue reaches the state that they wait for, by one polling query for all.
 
-    `read`: the states of those with these names; `interval_s`: between two queries; `patience_s`: who waits is let
-    go when nothing could be read for so long.
+    `read` returns states by name; `interval_s`: time between two queries; `patience_s`: all waiters are released after
+    nothing could be read for so long.
     """
 
     def __init__(
@@ -44,11 +44,11 @@ class ChangeWatch(Generic[State]):
 
     @property
     def closed(self) -> bool:
-        """Whether the service is going down, so that nobody should wait again."""
+        """True once the service is going down, so that nobody should wait again."""
         return self._closed
 
     async def until(self, name: str, reached: Callable[[State], bool], timeout_s: float) -> State | None:
-        """Return the state of what has this name once `reached` holds of it.
+        """Return the state of a job or venue once `reached` returns true for it.
 
         Return None after `timeout_s`, when the service goes down, or when nothing could be read for long.
         """
@@ -65,7 +65,7 @@ class ChangeWatch(Generic[State]):
             del self._waiting[future]
 
     async def run(self) -> None:
-        """Look after the waiting ones, for as long as the service runs."""
+        """Poll for the states that are waited for, until cancelled."""
         while True:
             await self._has_waiters.wait()
             try:
@@ -77,7 +77,7 @@ class ChangeWatch(Generic[State]):
                 now = asyncio.get_running_loop().time()
                 self._unread_since = self._unread_since or now
                 if now - self._unread_since > self._patience_s:
-                    self._let_go()
+                    self._release_all()
             for future, (name, reached) in self._waiting.items():
                 state = states.get(name)
                 if state is not None and reached(state) and not future.done():
@@ -87,11 +87,11 @@ class ChangeWatch(Generic[State]):
             await asyncio.sleep(self._interval_s)
 
     def close(self) -> None:
-        """Let everybody go, at once."""
+        """Release all waiters, now and later."""
         self._closed = True
-        self._let_go()
+        self._release_all()
 
-    def _let_go(self) -> None:
+    def _release_all(self) -> None:
         for future in self._waiting:
             if not future.done():
                 future.set_result(None)

@@ -1,4 +1,4 @@
-"""What the routes work with: built once per process, handed to each request."""
+"""Context of the routes: built once per process, handed to each request."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from service.store.statistics.snapshot import read_statistics
 
 # As often as `esc live` reports.
 LIVE_INTERVAL_S = 0.5
-# A database that is away for longer than a restart ends streams: who follows is to know that nothing is told.
+# A database that is away for longer than a restart ends streams, so that their clients know that nothing arrives.
 STREAM_PATIENCE_S = 5.0
 
 
@@ -56,7 +56,7 @@ class Context(ApplicationState):
         self.camera_views = CameraViews(self.snapshots)
 
     def close(self) -> None:
-        """Let the database go."""
+        """Close the connections to the database."""
         self.readiness.close()
         super().close()
 
@@ -83,8 +83,8 @@ ByActor = Annotated[Actor | None, Depends(_actor)]
 VenueIdPath = Annotated[str, Path(pattern=ID_PATTERN, examples=["tsukuba"])]
 
 
-def _of_a_job(job_id: str) -> str:
-    """Answer for an id that no job has as for one that no job has any more."""
+def _check_job_id(job_id: str) -> str:
+    """Validate a job id; one that no job can have is answered like one that no job has any more."""
     if not re.fullmatch(JOB_ID_PATTERN, job_id):
         raise Problem("job-not-found", "The ids of jobs are 26 letters and digits; GET /jobs lists those there are.")
     return job_id
@@ -92,6 +92,6 @@ def _of_a_job(job_id: str) -> str:
 
 JobIdPath = Annotated[
     str,
-    AfterValidator(_of_a_job),
+    AfterValidator(_check_job_id),
     Path(json_schema_extra={"pattern": JOB_ID_PATTERN}, examples=["01KAJ3Q6WZ5T3Y8R0N4M2C7B1D"]),
 ]

@@ -1,4 +1,4 @@
-"""How many clients may be connected: what a process may open less what it needs itself."""
+"""Limit of connected clients, from the open files that a process may have."""
 
 from __future__ import annotations
 
@@ -10,30 +10,30 @@ from service.settings import Settings
 
 # More descriptors than that no API process needs.
 ENOUGH = 65_536
-# Databases' connections, pipes of programs, files, and clients that were accepted and not counted yet.
-FOR_ITSELF = 256
+# Connections to databases, pipes of programs, files, and clients that were accepted and not counted yet.
+RESERVED = 256
 log = structlog.get_logger()
 
 
 def most_connections(settings: Settings) -> int:
-    """Raise this process's soft limit of open files as far as it may be, and see how many clients that allows.
+    """Raise this process's soft limit of open files as far as possible; return how many clients that allows.
 
-    Settings that ask for more are told in the log: the service runs, and refuses clients before it runs out of files.
+    Logs a warning if settings ask for more: the service runs, and refuses clients before it runs out of files.
     """
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     wanted = ENOUGH if hard == resource.RLIM_INFINITY else min(ENOUGH, hard)
     if soft != resource.RLIM_INFINITY and soft < wanted:
         resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))
         soft = wanted
-    to_be_had = ENOUGH if soft == resource.RLIM_INFINITY else soft
-    most = max(1, min(settings.connections, to_be_had - FOR_ITSELF - settings.uploads_at_once))
+    available = ENOUGH if soft == resource.RLIM_INFINITY else soft
+    most = max(1, min(settings.connections, available - RESERVED - settings.uploads_at_once))
     if most < settings.connections:
         log.warning(
             "fewer clients can be connected than ESC_CONNECTIONS says: raise the limit of open files (LimitNOFILE of "
             "the unit, ulimits of the container, ulimit -Hn)",
             asked=settings.connections,
             connections=most,
-            open_files=to_be_had,
+            open_files=available,
         )
     if settings.followers + settings.waiters >= most:
         log.warning(

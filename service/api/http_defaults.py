@@ -1,4 +1,4 @@
-"""What every address has in common: HEAD (RFC 9110, section 9.3.2), and headers that keep browsers from guessing."""
+"""HEAD for every address (RFC 9110, section 9.3.2), and headers that keep browsers from guessing types."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ FOR_BROWSERS = {"X-Content-Type-Options": "nosniff", "Cross-Origin-Resource-Poli
 
 
 class HttpDefaults:
-    """ASGI middleware, around all others."""
+    """ASGI middleware: answers HEAD as GET without a body, and adds headers for browsers."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app

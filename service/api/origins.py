@@ -1,4 +1,4 @@
-"""Who may call a service that asks for no keys: programs of this machine, not the pages that its browsers show.
+"""Protection of a service that asks for no keys from pages of other sites.
 
 A page of any site may have the browser of a visitor post to http://127.0.0.1:8000, and read the answers as well once
 the name it came from is made to point there (DNS rebinding). A browser names the host it believes to talk to (`Host`)
@@ -21,9 +21,9 @@ NOWHERE = SplitResult("", "", "", "", "")
 
 
 def check(request: HTTPConnection, settings: Settings) -> None:
-    """Refuse what a foreign page may have asked for."""
+    """Raise the problem `host-unknown` or `origin-foreign` if a page of another site may have sent a request."""
     host, origin = request.headers.get("host", ""), request.headers.get("origin")
-    # Who listens to the world without keys has a proxy that decides, under names that only the operator knows.
+    # A service that listens to the world without keys has a proxy that decides, under names that the operator knows.
     any_name = settings.listens_beyond_this_machine and not settings.allowed_hosts
     if not any_name and not _is_ours(_split(f"//{host}"), settings.allowed_hosts):
         raise Problem(

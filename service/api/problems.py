@@ -1,4 +1,4 @@
-"""How problems leave: every error of the application becomes the answer that RFC 9457 describes."""
+"""Error handlers: every error of the application becomes a problem (RFC 9457)."""
 
 from __future__ import annotations
 
@@ -19,14 +19,13 @@ from service.schemas.findings import describe_errors
 from service.schemas.merge_patch import MEDIA_TYPE as MERGE_PATCH
 from service.schemas.problems import MEDIA_TYPE, PROBLEM_TYPES, Problem
 from service.store.unreadable import UnreadableRow
-from service.store.venues import VenueRefused
 
 MOST_ERRORS = 100
 log = structlog.get_logger()
 
 
 def problem_response(problem: Problem) -> Response:
-    """The HTTP answer. Escaped to ASCII: a client's lone surrogates must not break it."""
+    """Return the HTTP response, escaped to ASCII: a client's lone surrogates must not break it."""
     content = json.dumps(problem.members(), ensure_ascii=True).encode("ascii")
     return Response(content, PROBLEM_TYPES[problem.kind].status, problem.headers, MEDIA_TYPE)
 
@@ -34,22 +33,23 @@ def problem_response(problem: Problem) -> Response:
 def validation_problem(
     error: ValidationError | RequestValidationError, model: Any, document: Any, *inside: str
 ) -> Problem:
-    """What a schema found, each finding with the place it was found at. `model`, `document`: see `describe_errors`.
+    """Return the problem of a document that a schema refuses, with the place of each error.
 
-    A document of a megabyte can have a hundred thousand mistakes; whoever mends it needs the first of them.
+    `model`, `document`: see `describe_errors`. A document of a megabyte can have a hundred thousand errors; the first
+    ones are enough to mend it.
     """
     everything = error.errors()
     found = everything[:MOST_ERRORS]
     places = [".".join(str(step) for step in (*inside, *finding["loc"])) for finding in found]
-    told = describe_errors(found, model, document)
-    findings = [{"where": where, "message": message} for where, message in zip(places, told, strict=True)]
+    messages = describe_errors(found, model, document)
+    findings = [{"where": where, "message": message} for where, message in zip(places, messages, strict=True)]
     if len(everything) == len(found):
-        return Problem("invalid-request", told[0], errors=findings)
-    return Problem("invalid-request", told[0], errors=findings, errors_left_off=len(everything) - len(found))
+        return Problem("invalid-request", messages[0], errors=findings)
+    return Problem("invalid-request", messages[0], errors=findings, errors_left_off=len(everything) - len(found))
 
 
 def unreadable_problem(error: UnreadableRow) -> Problem:
-    """Answer who asks for a row that cannot be read."""
+    """Return the problem of a stored row that cannot be read."""
     here = f"/{error.kind}s/{error.id}"
     ways_out = {
         "venue": f"POST {here}/restore with a revision of GET {here}/history, PUT {here} anew, or DELETE it.",
@@ -59,15 +59,8 @@ def unreadable_problem(error: UnreadableRow) -> Problem:
     return Problem("unreadable", f"The {error}. {what_to_do}", what=error.kind, id=error.id)
 
 
-def poses_refused(error: VenueRefused) -> Problem:
-    """Answer who wants a venue to be as no client could send it."""
-    return Problem(
-        "poses-refused", f"{error}. Nothing was changed. Calibrate again; if it is the ridge, without fit_ridge."
-    )
-
-
 def not_json(request: Request) -> Problem:
-    """Answer a document that came as another media type."""
+    """Return the problem of a document that came as another media type."""
     got = request.headers.get("content-type", "")[:200]
     # RFC 5789, section 2.2.
     headers = {"Accept-Patch": MERGE_PATCH} if request.method == "PATCH" else None
@@ -75,7 +68,7 @@ def not_json(request: Request) -> Problem:
 
 
 def install_handlers(app: FastAPI) -> None:
-    """Let every error of `app` leave as a problem."""
+    """Answer every error of `app` with a problem."""
 
     @app.exception_handler(Problem)
     async def problem(_: Request, error: Problem) -> Response:
@@ -103,10 +96,6 @@ def install_handlers(app: FastAPI) -> None:
     async def unreadable(_: Request, error: UnreadableRow) -> Response:
         return problem_response(unreadable_problem(error))
 
-    @app.exception_handler(VenueRefused)
-    async def refused(_: Request, error: VenueRefused) -> Response:
-        return problem_response(poses_refused(error))
-
     @app.exception_handler(Exception)
     async def unexpected(_: Request, error: Exception) -> Response:
         log.error("unexpected error", exc_info=error)
@@ -114,7 +103,7 @@ def install_handlers(app: FastAPI) -> None:
 
 
 def _invalid_request(request: Request, error: RequestValidationError) -> Problem:
-    """Of a body that is named as in the documents, not as what FastAPI calls it."""
+    """Return the problem of an invalid request; places in its body begin with `body`, whatever FastAPI calls it."""
     field = getattr(request.scope.get("route"), "body_field", None)
     return validation_problem(error, None if field is None else field.field_info.annotation, error.body)
 
@@ -125,7 +114,7 @@ def _from_http(request: Request, error: HTTPException) -> Problem:
             return Problem("not-found", f"Nothing is at {request.url.path}; /docs lists what there is.")
         case 405:
             allowed = ", ".join(sorted(_methods_at(request)))
-            return Problem("method-not-allowed", f"Here work {allowed}.", headers={"Allow": allowed})
+            return Problem("method-not-allowed", f"Allowed methods: {allowed}.", headers={"Allow": allowed})
         case 413:
             return Problem("body-too-large", str(error.detail), headers=error.headers)
         case _:
@@ -133,7 +122,7 @@ def _from_http(request: Request, error: HTTPException) -> Problem:
 
 
 def _methods_at(request: Request) -> set[str]:
-    """What works at this address; the router itself names the methods of one of its routes."""
+    """Return all methods of an address; the router itself names those of one of its routes."""
     path = request.scope["path"]
     routes = iter_route_contexts(request.app.routes)
     here = [route for route in routes if route.path is not None and compile_path(route.path)[0].match(path)]

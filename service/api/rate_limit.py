@@ -1,4 +1,4 @@
-"""How often somebody may do something: token buckets, in the memory of one process."""
+"""Rate limits: token buckets in the memory of one process."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ ROUNDING = 1e-3
 
 
 class TokenBuckets:
-    """A bucket per name. A full one holds `burst` tokens, and `per_s` tokens a second flow in.
+    """Token buckets by name. A full one holds `burst` tokens, and `per_s` tokens a second flow in.
 
-    Kept is one number per name, the moment at which its bucket will be full again: a full bucket and one that was never
-    heard of are the same, so memory is bounded by forgetting, of `at_most` names, those that are full soonest.
+    Each name needs one number, the moment at which its bucket will be full again. A full bucket and an unknown one are
+    the same, so memory is bounded by forgetting those that are full soonest, beyond `at_most` names.
     """
 
     def __init__(
@@ -31,7 +31,7 @@ class TokenBuckets:
         return len(self._full_at)
 
     def wait_s(self, name: str) -> float:
-        """How long until there is a token; 0: there is one."""
+        """Return the seconds until there is a token, 0 if there is one."""
         now = self._clock()
         return max(0.0, self._full_at.get(name, now) - now - self._slack_s)
 

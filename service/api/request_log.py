@@ -1,4 +1,4 @@
-"""Around every request: its id, its line in the log, its place in the metrics."""
+"""Id, log line and metrics of every request."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ log = structlog.get_logger()
 
 
 class RequestLog:
-    """ASGI middleware; takes the caller's X-Request-ID if it is harmless, or their trace's id, and answers with it.
+    """ASGI middleware that names requests: by the caller's X-Request-ID if it is harmless, or by the id of their trace.
 
     Routes find it, for what goes on after the answer, as `request.state.origin`.
     """
@@ -62,21 +62,21 @@ class RequestLog:
         method = scope["method"] if scope["method"] in METHODS else "other"
         self._metrics.requests.labels(method, route, status).inc()
         # An answer that waits for a job's end would hide how fast the others are.
-        held = "?wait" if route == "/jobs/{job_id}" and "wait" in QueryParams(scope["query_string"]) else ""
-        self._metrics.seconds.labels(method, route + held).observe(seconds)
+        suffix = "?wait" if route == "/jobs/{job_id}" and "wait" in QueryParams(scope["query_string"]) else ""
+        self._metrics.seconds.labels(method, route + suffix).observe(seconds)
         say = log.debug if is_quiet(scope) else log.info
         asked = {"method": scope["method"], "path": scope["path"], "address": origin.address}
         say("request", **asked, status=status, seconds=round(seconds, 4))
 
 
 def is_quiet(scope: Scope) -> bool:
-    """Whether a request is one of those that machines make every few seconds: not worth a line, nor a span."""
+    """True for requests that machines make every few seconds, which are worth neither a log line nor a span."""
     path: str = scope.get("path", "")
     return path in QUIET or (scope.get("method") == "PUT" and LIVE_REPORT.fullmatch(path) is not None)
 
 
 def _address(scope: Scope) -> str | None:
-    """The client's address, behind a trusted proxy the one that it names; None: it is none, as on a Unix socket."""
+    """Return the client's address, as a trusted proxy names it; None if it has none, as on a Unix socket."""
     client = scope.get("client")
     address = ip_of(client[0]) if client else None
     # Without the interface that a link-local address may name: it says nothing about the client.
@@ -84,7 +84,7 @@ def _address(scope: Scope) -> str | None:
 
 
 def _names(headers: Headers) -> tuple[str, str | None]:
-    """What to call a request, as its caller does or as their trace is called, and its place in a trace."""
+    """Return the id of a request, from its caller or their trace, and its place in a trace (`traceparent`)."""
     given = headers.get("traceparent")
     traceparent = current_traceparent() or (given if trace_id_in(given) else None)
     name = headers.get("x-request-id", "")

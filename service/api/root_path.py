@@ -1,7 +1,7 @@
-"""A service below a path of another site, https://truck.example.com/esc/: addresses come and leave with that path.
+"""Service below a path of another site, such as https://truck.example.com/esc/.
 
-The routes know nothing of it. Addresses in JSON are relative to the address of the service, whatever that is: they are
-the same for every process and in every webhook, and are appended to the URL that a client was given.
+The routes do not know the path. Addresses in JSON are relative to the address of the service, whatever that is: they
+are the same for every process and in every webhook, and are appended to the URL that a client was given.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ ADDRESS = re.compile(
 
 
 def with_root_path(html: str, root_path: str) -> str:
-    """A page whose addresses of this service have the path that it is below."""
+    """Return a page with the root path in front of all addresses of this service."""
     return ADDRESS.sub(rf"\g<1>{root_path}", html) if root_path else html
 
 
 class RootPath:
-    """ASGI middleware, around all others: takes the path off requests that have it, and puts it into `Location`.
+    """ASGI middleware, around all others: takes the root path off requests, and puts it into `Location`.
 
     A `Location` is made relative to the host: which one the client names is his word, not an address of the service.
     """

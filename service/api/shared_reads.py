@@ -1,4 +1,4 @@
-"""Reading jobs for many clients at once: those that ask for one job while it waits to be read get the same answer.
+"""Reads of jobs that clients share: all that ask for a job before its read begins get the same answer.
 
 A production tool polls one job from many places. Each answer shows the job as it is after its request came, so a read
 that has begun is not shared with anybody who comes later: they share the next one.
@@ -13,12 +13,12 @@ from starlette.concurrency import run_in_threadpool
 
 from service.schemas.job import Job
 
+# More threads only wait for each other, which cost the slowest of fifty pollers a second.
 AT_ONCE = 2
-"""Reads: more threads only wait for each other, which cost the slowest of fifty pollers a second."""
 
 
 class SharedReads:
-    """Jobs by their id, read in few threads."""
+    """Reads jobs by id in few threads."""
 
     def __init__(self, read: Callable[[str], Job | None]) -> None:
         self._read = read
@@ -26,7 +26,7 @@ class SharedReads:
         self._next: dict[str, asyncio.Task[Job | None]] = {}
 
     async def get(self, job_id: str) -> Job | None:
-        """The job as it is now; None if there is none."""
+        """Return a job as it is after this call, None if there is none."""
         reading = self._next.get(job_id)
         if reading is None:
             reading = self._next[job_id] = asyncio.create_task(self._when_its_turn_comes(job_id))

@@ -1,9 +1,10 @@
-"""Connections to clients that take their time, or speak no HTTP.
+"""Time limits of connections to slow clients, and their number.
 
 Uvicorn closes a connection that is idle between two requests and waits for ever for anybody else: for the rest of a
 head, for the rest of a body, for an answer to be taken. A thousand such clients cost nothing to run and hold every
-connection that a process may have. Here a client that owes bytes has a limit, the server looks at all connections once
-a second, and who is over the limit is told so where that is still possible, and let go.
+connection that a process may have. Here clients that owe bytes have a time limit: the server looks at all connections
+once a second and closes those over the limit, with an answer where that is still possible. Uvicorn has no option for
+this.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ class ConnectionLimiter:
 
     def __init__(self, most: int) -> None:
         self._most = most
-        # Those that sent something last are last.
+        # In the order in which they last sent something.
         self._connected: OrderedDict[Connection, None] = OrderedDict()
         self._logged_at = -LOGGED_EVERY_S
 
@@ -52,12 +53,12 @@ class ConnectionLimiter:
         return True
 
     def touch(self, connection: Connection) -> None:
-        """A client has sent something."""
+        """Note that a client has sent something."""
         if connection in self._connected:
             self._connected.move_to_end(connection)
 
     def remove(self, connection: Connection) -> None:
-        """A client is gone."""
+        """Forget a client that is gone."""
         self._connected.pop(connection, None)
 
     def _make_room(self) -> bool:
@@ -71,7 +72,7 @@ class ConnectionLimiter:
 
 
 class Connection(H11Protocol):
-    """Uvicorn's connection, with a memory of who is waiting for whom."""
+    """Uvicorn's HTTP/1.1 connection that remembers since when its client owes bytes."""
 
     def __init__(self, limiter: ConnectionLimiter, *arguments: Any, **more: Any) -> None:
         super().__init__(*arguments, **more)
@@ -82,7 +83,7 @@ class Connection(H11Protocol):
         self._unsent_bytes = 0
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """A client has connected."""
+        """Admit or refuse a client that has connected."""
         # asyncio sets this only where a socket names its protocol, and those of a listener do not. Without it the body
         # of an answer waits until its head has been acknowledged, which clients put off by 40 ms.
         transport.get_extra_info("socket").setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
@@ -91,25 +92,25 @@ class Connection(H11Protocol):
             self._refuse(Problem("unavailable", "Too many clients are connected.", headers={"Retry-After": "5"}))
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """A client is gone."""
+        """Free the place of the client."""
         self._limiter.remove(self)
         super().connection_lost(exc)
 
     @property
     def is_silent(self) -> bool:
-        """Whether the client waits for nothing: it has asked nothing yet, or has its answer and owes a body."""
+        """True if the client waits for nothing: it has asked nothing yet, or has its answer."""
         answered = self.cycle is not None and self.cycle.response_complete
         return (answered or self.conn.their_state is h11.IDLE) and not self.transport.get_write_buffer_size()
 
     def close_if_overdue(self, now: float, stall_s: float, whole_s: float) -> None:
         """End the connection if nothing moved for `stall_s`, or what moves has not come to its end for `whole_s`."""
         owed = self._what_is_owed()
-        left = self.transport.get_write_buffer_size()
+        unsent_bytes = self.transport.get_write_buffer_size()
         if owed != self._owed:
             self._owed, self._owed_since, self._progress_at = owed, now, now
-        elif (owed == "taking" and left < self._unsent_bytes) or (owed == "body" and self.flow.read_paused):
+        elif (owed == "taking" and unsent_bytes < self._unsent_bytes) or (owed == "body" and self.flow.read_paused):
             self._progress_at = now
-        self._unsent_bytes = left
+        self._unsent_bytes = unsent_bytes
         if owed is None:
             return
         # A head is small: it is whole in the time in which anything else must only move.
@@ -117,14 +118,14 @@ class Connection(H11Protocol):
             self._close_slow(owed)
 
     def data_received(self, data: bytes) -> None:
-        """Something came."""
+        """Note that the client has sent something, and parse it."""
         self._limiter.touch(self)
         if self._owed == "body":
             self._progress_at = self.loop.time()
         super().data_received(data)
 
     def send_400_response(self, msg: str) -> None:  # noqa: ARG002
-        """What came is no HTTP."""
+        """Answer bytes that are no HTTP."""
         self._refuse(Problem("malformed-request", "This is no HTTP/1.1 request, or its head is larger than 64 kB."))
 
     def _what_is_owed(self) -> Owed | None:
@@ -136,14 +137,14 @@ class Connection(H11Protocol):
         return "head" if begun and self.conn.their_state is h11.IDLE else None
 
     def _close_slow(self, owed: Owed) -> None:
-        log.info("client let go", owed=owed, address=self.client[0] if self.client else "")
+        log.info("slow client disconnected", owed=owed, address=self.client[0] if self.client else "")
         if owed == "taking":
             self.transport.abort()
             return
         self._refuse(Problem("too-slow", f"The {owed} of the request did not come to its end in time."))
 
     def _refuse(self, problem: Problem) -> None:
-        """Answer, where no answer has begun, and close; whoever waits for the rest of the request waits no longer."""
+        """Answer, if no answer has begun, and close; the application stops to wait for the rest of the request."""
         if self.conn.our_state in (h11.IDLE, h11.SEND_RESPONSE):
             response = problem_response(problem)
             head = [*response.raw_headers, (b"connection", b"close")]

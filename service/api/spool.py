@@ -1,4 +1,4 @@
-"""The files of a form on the disk while it arrives: one temporary file for all of them.
+"""Spool of an upload: one temporary file for all files of a form.
 
 Starlette keeps each file below 1 MB in memory, and opens a descriptor for each of the others. A form of many frames
 just below that size is hundreds of megabytes, and one of 150 larger ones is 150 descriptors. Files of a form come one
@@ -19,7 +19,7 @@ from service.schemas.problems import Problem
 
 
 class Spool:
-    """A temporary file, gone at the end of its block, that the files of a form are appended to."""
+    """Temporary file that the files of a form are appended to; it is deleted at the end of its block."""
 
     def __init__(self) -> None:
         self._file = tempfile.TemporaryFile()  # noqa: SIM115  (closed by __exit__)
@@ -33,7 +33,7 @@ class Spool:
 
     @property
     def size(self) -> int:
-        """The bytes in it."""
+        """Number of bytes written."""
         return self._size
 
     def append(self, data: bytes) -> None:
@@ -49,7 +49,7 @@ class Spool:
 
 
 class SpooledFile:
-    """One file of a form, as `UploadFile` wants it: written to its end, then read."""
+    """File of a form for `UploadFile`, a part of a spool: written to its end, then read."""
 
     def __init__(self, spool: Spool) -> None:
         self._spool = spool
@@ -58,7 +58,7 @@ class SpooledFile:
         self._position = 0
 
     def write(self, data: bytes) -> int:
-        """Append to it."""
+        """Append bytes."""
         if not self._length:
             self._start = self._spool.size
         assert self._start + self._length == self._spool.size, "files of a form come one after the other"
@@ -67,20 +67,20 @@ class SpooledFile:
         return len(data)
 
     def read(self, size: int = -1) -> bytes:
-        """Up to `size` bytes from where the last reading ended; -1: all that is left."""
-        left = self._length - self._position
-        data = self._spool.read(self._start + self._position, left if size < 0 else min(size, left))
+        """Return up to `size` bytes from where the last read ended; -1: all of the rest."""
+        rest = self._length - self._position
+        data = self._spool.read(self._start + self._position, rest if size < 0 else min(size, rest))
         self._position += len(data)
         return data
 
     def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
-        """Go on reading elsewhere."""
+        """Set where the next read begins."""
         origin = {io.SEEK_SET: 0, io.SEEK_CUR: self._position, io.SEEK_END: self._length}[whence]
         self._position = min(max(0, origin + offset), self._length)
         return self._position
 
     def close(self) -> None:
-        """Nothing: what holds the bytes is closed by whoever opened it."""
+        """Do nothing: the spool is closed by its own block."""
 
 
 class _Parser(MultiPartParser):

@@ -1,4 +1,4 @@
-"""Uploads while they arrive and are checked: how many and how large at once, on the disk and in memory."""
+"""Limits of the number and size of uploads that arrive at once, on the disk and in memory."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ PATIENCE_S = 15.0
 
 
 class Uploads:
-    """Those that one API process takes at the moment."""
+    """Uploads that arrive at one API process now."""
 
     def __init__(self, settings: Settings) -> None:
         self._at_once = settings.uploads_at_once
         self._most = int(settings.uploads_mb * 1e6)
         self._largest = int(settings.max_body_mb * 1e6)
-        # What each of them may still bring.
+        # Announced size of each, in bytes.
         self._announced: list[int] = []
         self._room = IN_MEMORY_BYTES
         self._room_changed = threading.Condition()
 
     @contextmanager
     def admitted(self, request: Request) -> Iterator[None]:
-        """Let an upload in, or refuse it before it is read. To be asked in the event loop."""
+        """Admit an upload, or raise a problem before it is read. To be called in the event loop."""
         if len(self._announced) >= self._at_once:
             raise Problem(
                 "unavailable",
@@ -51,7 +51,7 @@ class Uploads:
                 f"than {self._most / 1e6:.0f} MB (ESC_UPLOADS_MB).",
                 headers=AGAIN,
             )
-        # Of the others, part has been written: counted twice rather than not at all.
+        # Part of the other uploads is written already: counted twice rather than not at all.
         if spool_free_bytes() < size + sum(self._announced):
             raise Problem(
                 "disk-full",
@@ -66,9 +66,9 @@ class Uploads:
 
     @contextmanager
     def content(self, upload: UploadFile) -> Iterator[bytes]:
-        """The bytes of one file, once there is room for them beside those of others. To be asked in a thread.
+        """Yield the bytes of one file, once there is room for them in memory. To be called in a thread.
 
-        Whoever gets them lets them go with the block.
+        The caller must drop them at the end of the block.
         """
         size = min(upload.size or 0, IN_MEMORY_BYTES)
         with self._room_changed:

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Mapping, Sequence
 from typing import Literal
 
-from service.api.programs.running import OneAtATime
+from service.api.programs.program_pool import run_program
 from service.formats.lens import NumberedCamera
+from service.schemas.problems import Problem
 
 # A 4K lens takes 10 s of one core, and its maps 100 MB.
-_maps = OneAtATime("set of ST maps", longest_s=60, again_s=10)
+LONGEST_S = 60.0
+_turn = threading.Lock()
 
 
 def write(
@@ -19,4 +22,10 @@ def write(
     environment: Mapping[str, str],
 ) -> bytes:
     """Both directions; `origin`: the corner that green counts from."""
-    return _maps.run([*program, origin], environment, shot.camera.model_dump_json().encode())
+    if not _turn.acquire(blocking=False):
+        raise Problem("unavailable", "Another set of ST maps is being made.", headers={"Retry-After": "10"})
+    try:
+        given = shot.camera.model_dump_json().encode()
+        return run_program("set of ST maps", [*program, origin], environment, given, LONGEST_S)
+    finally:
+        _turn.release()

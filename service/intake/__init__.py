@@ -1,1 +1,1 @@
-"""Frames on their way in: sent or fetched, looked at, stored, and put into the queue as a job."""
+"""Intake of frames: they are sent or fetched, checked, stored, and queued as a job."""

@@ -1,4 +1,4 @@
-"""Calibrations whose frames nobody sends: the service fetches them from the sources of the cameras."""
+"""Calibrations whose frames the service fetches from the sources of the cameras."""
 
 from __future__ import annotations
 
@@ -14,8 +14,9 @@ from service.schemas.problems import PROBLEM_TYPES, Problem
 from service.schemas.venue import Venue
 from service.store.blobs import Blobs
 from service.store.ids import new_id
-from service.store.jobs.submission import Submission, SubmissionRepository, VenueGone, fetched_hash
+from service.store.jobs.submission import Submission, SubmissionRepository, fetched_hash
 from service.store.jobs.task import Origin, seeded
+from service.store.refusals import no_such_venue
 from service.store.venues import VenueRepository
 
 
@@ -47,12 +48,11 @@ class FromSources:
         within_s: float | None = None,
         fetched: Callable[[], None] = lambda: None,
     ) -> tuple[Job, bool]:
-        """A job from a frame of each source, or several, or the job that the request already is; says if it is new.
+        """Fetch frames of each source and submit them; return the job that they are, and True if it is new.
 
         `within_s`: the time that the sources have, at most that of the settings. `fetched` is called once all frames
-        have come.
-        Raises a `Problem` for a source that gives no frame, `VenueGone` and what else `Intake.take` raises. The same
-        request is the same job whatever the cameras show meanwhile.
+        have come. Raises a `Problem` for a source that gives no frame, and those of `Intake.take`. The same request is
+        the same job whatever the cameras show meanwhile.
         """
         sent = fetched_hash(options)
         known = self._submissions.same_as(venue_id, key, sent)
@@ -61,7 +61,7 @@ class FromSources:
         self._intake.require_place(origin)
         found = self._venues.with_credentials(venue_id)
         if found is None:
-            raise VenueGone
+            raise no_such_venue(venue_id)
         venue, credentials = found
         taken = self._snapshots.take_of_all(venue.cameras, credentials, frames, spacing_s, within_s)
         fetched()
@@ -76,7 +76,7 @@ class FromSources:
         return self._intake.take(submission, store)
 
     def fail(self, venue: Venue, options: Options, key: str | None, origin: Origin, why: Problem) -> Job:
-        """A job for a calibration that nobody waits for and whose frames could not be had: it has failed."""
+        """Record a failed job for a scheduled calibration whose frames could not be fetched."""
         error = JobError(
             type=problem_uri(why.kind),
             title=PROBLEM_TYPES[why.kind].title,

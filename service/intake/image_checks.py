@@ -1,4 +1,4 @@
-"""Is this upload a whole picture of the right size? Answered from its bytes, before anything decodes it.
+"""Checks of uploaded pictures from their bytes, before anything decodes them: whole, and of the right size.
 
 JPEG: ITU-T T.81, annex B. PNG: ISO/IEC 15948, clause 5. Decoders are lenient where a calibration must not be: OpenCV
 fills the missing part of a truncated JPEG with grey and says nothing. Sizes are read here and not by a package: those
@@ -29,7 +29,7 @@ JPEG_MARKER = re.compile(rb"\xff([^\x00\xd0-\xd7\xff])")
 JPEG_END, JPEG_SCAN = 0xD9, 0xDA
 # Bytes FF before a marker fill up, as many as there are.
 NOT_FILLED = re.compile(rb"[^\xff]")
-# Of a file: a camera's JPEG has tens, a progressive one hundreds. PNG encoders cut pixels into chunks of 4 kB and more.
+# A camera's JPEG has tens of parts, a progressive one hundreds. PNG encoders cut pixels into chunks of 4 kB and more.
 # Walking a million would take seconds, in which nobody else is answered.
 MOST_SEGMENTS, MOST_CHUNKS = 10_000, 50_000
 # Start of frame, of all processes; C4, C8 and CC are something else.
@@ -37,13 +37,13 @@ JPEG_FRAMES = set(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
 
 
 class TooManyParts(Exception):  # noqa: N818
-    """A file is made of more parts than any encoder writes; the message says how many."""
+    """Raised for a file of more parts than any encoder writes; the message says how many."""
 
 
 def check_cameras(
     venue: Venue | SoughtSite, counts: Mapping[str, int], settings: Settings, needed: Collection[str] | None = None
 ) -> None:
-    """Every camera of the venue has frames, not too many, and no other camera has; `needed`: only these must have."""
+    """Raise a problem unless every camera has frames, not too many, and no other has; `needed`: only these must."""
     ids = [camera.id for camera in venue.cameras]
     for name in counts:
         if name not in ids:
@@ -68,13 +68,13 @@ def check_cameras(
 
 
 class PixelBudget:
-    """The pixels that all frames of one upload may have together: a job keeps them decoded, all at once."""
+    """Limit of the pixels of all frames of one upload together: a job keeps them decoded, all at once."""
 
     def __init__(self, settings: Settings) -> None:
         self._most, self._pixels = settings.max_job_pixels, 0
 
     def spend(self, size: Sequence[int], **part: Any) -> None:
-        """Count a frame. Raises a `Problem` where it is one too many."""
+        """Count a frame; raises the problem `too-many-pixels` if the limit is exceeded."""
         self._pixels += size[0] * size[1]
         if self._pixels > self._most:
             raise Problem(
@@ -91,7 +91,7 @@ class PixelBudget:
 def check(
     camera: Camera | SoughtCameraIn, data: bytes, settings: Settings, budget: PixelBudget, *, of_any_size: bool = True
 ) -> None:
-    """One frame: an entire JPEG or PNG of the camera's size, where that is known, within the budget of its job.
+    """Raise a problem unless a frame is an entire JPEG or PNG of the camera's size, within the budget of its job.
 
     `of_any_size`: frames of its shape will do, which are resized; points are clicked in pixels of its size.
     """
@@ -105,12 +105,12 @@ def check(
 
 
 def check_photo(name: str, data: bytes, settings: Settings) -> None:
-    """One photo of a board: an entire JPEG or PNG of any size. Photos are decoded one by one, and none is kept."""
+    """Raise a problem unless a photo of a board is an entire JPEG or PNG of any size."""
     _size_of_whole_picture(data, settings, photo=name)
 
 
 def check_length(length: int, settings: Settings, **part: Any) -> None:
-    """So many bytes are not too many for one picture; `part`, a camera or a photo by its name, is whose they are."""
+    """Raise the problem `frame-too-large` for too many bytes; `part`: the name of their `camera` or `photo`."""
     if length > settings.max_frame_mb * 1e6:
         raise Problem(
             "frame-too-large",
@@ -120,12 +120,12 @@ def check_length(length: int, settings: Settings, **part: Any) -> None:
 
 
 def in_words(part: Mapping[str, Any]) -> str:
-    """Return whose a file is, by what kind and name."""
+    """Return the name of a part of an upload, such as `camera left`."""
     return " ".join(f"{kind} {name}" for kind, name in part.items())
 
 
 def _size_of_whole_picture(data: bytes, settings: Settings, **parts: Any) -> list[int]:
-    """Width and height of a picture that is all there; `parts` name it in a problem."""
+    """Return width and height of a picture, or raise a problem if it is not entire; `parts` name it."""
     subject = in_words(parts)
     if not data:
         raise Problem("empty-frame", f"The file of {subject} is empty; was it still being written?", **parts)
@@ -162,7 +162,7 @@ def _size_of_whole_picture(data: bytes, settings: Settings, **parts: Any) -> lis
 
 @dataclass(frozen=True)
 class Outline:
-    """What a file says about its picture: `size` (width, height) as stored, and whether the file goes to its end.
+    """Structure of a picture file: `size` (width, height) as stored, and whether the file is `whole`.
 
     As stored: an orientation that the camera notes in its EXIF data turns nothing, here and when it is decoded.
     """
@@ -172,7 +172,7 @@ class Outline:
 
 
 def _jpeg(data: bytes, begin: int) -> Outline:
-    """Walk the segments to the end-of-image marker; whatever follows it is the camera's business."""
+    """Walk the segments to the end-of-image marker; cameras write what they like behind it."""
     position, size = begin + 2, None
     for number, (position, marker) in enumerate(_jpeg_segments(data, begin)):
         if number >= MOST_SEGMENTS:
@@ -190,7 +190,7 @@ def _jpeg(data: bytes, begin: int) -> Outline:
 
 
 def _jpeg_segments(data: bytes, begin: int) -> Iterator[tuple[int, int]]:
-    """Position and code of each marker, up to end-of-image after a scan or to the end of the data."""
+    """Yield position and code of each marker, up to end-of-image after a scan or to the end of the data."""
     position, scanned = begin + 2, False
     while position + 2 <= len(data):
         if data[position] != 0xFF:

@@ -1,9 +1,9 @@
-"""What is said of a pose from which no field is filmed: in which other convention it was most likely written.
+"""Warnings about poses from which no field is filmed, with the convention in which they were most likely written.
 
     warnings = warnings_of(poses, stored)
 
-Each reading of such a pose is tried on the field: the one under which the camera stands upright, above and near the
-field, and sees most of its markings, is the one that is named. OpenCV takes its time to load: import this where a venue
+Each reading of such a pose is tried on the field. A warning names the one under which the camera stands upright, above
+and near the field, and sees most of its markings. OpenCV takes its time to load: import this where a venue
 was put.
 """
 
@@ -22,7 +22,7 @@ from service.store.movement import visible_m
 
 # As much as a job needs of it.
 LEAST_VISIBLE_M = 15.0
-# Where cameras of fields stand: above the ground, and from its centre.
+# Limits of where cameras of fields stand: above the ground, and from its centre.
 HIGHEST_M, FARTHEST_M = 200.0, 500.0
 STEEPEST_ROLL_DEG = 60.0
 # Component of the view along the vertical from which a picture has no upright.
@@ -34,14 +34,14 @@ MUCH_MORE = 1.5
 # Farther than this beside a field, or higher, hardly a camera stands that films it: a place in feet may.
 USUALLY_BESIDE_M, USUALLY_HIGH_M = 100.0, 60.0
 METRES_IN_A_FOOT = 0.3048
-# How far from the middle of the picture, in parts of its side, a principal point is that belongs to another picture...
+# Distance of a principal point from the middle of the picture, in parts of its side, that belongs to another picture...
 OFF_CENTRE = 0.2
-# ...and how near to it in the one it belongs to.
+# ...and at most in the one it belongs to.
 CENTRED = 0.1
 
 
 def warnings_of(poses: Sequence[PoseIn], stored: Venue) -> list[str]:
-    """A line for each camera whose pose, as it was sent, or picture was most likely written in another convention."""
+    """Return a line for each camera whose pose or picture size was most likely sent in another convention."""
     lines = []
     for sent, camera in zip(poses, stored.cameras, strict=True):
         lines += [f"camera {camera.id}: {words}" for words in _warnings(stored.field, sent, camera)]
@@ -50,7 +50,7 @@ def warnings_of(poses: Sequence[PoseIn], stored: Venue) -> list[str]:
 
 @dataclass(frozen=True)
 class _Reading:
-    """Another meaning of a pose that was sent: what it would then be, and what to send in its place."""
+    """Another meaning of a pose that was sent: the pose that it would be, and in words what to send instead."""
 
     pose: Pose
     what: str
@@ -81,7 +81,7 @@ def _warnings(field: FieldOfPlay, sent: PoseIn, camera: PosedCamera) -> Iterator
 
 
 def _doubted_feet(field: FieldOfPlay, camera: PosedCamera) -> Iterator[str]:
-    """What is said of a camera that films the field from very far off, and in feet stands where cameras do.
+    """Warn of a camera that films the field from very far off, and in feet would stand where cameras do.
 
     A place in feet that is nearer is not found: nothing but the frame tells it from one in metres.
     """
@@ -112,7 +112,7 @@ def _fault(pose: Pose, seen_m: float) -> str:
 
 
 def _meant(field: FieldOfPlay, sent: PoseIn, camera: PosedCamera, least_m: float) -> tuple[_Reading, float] | None:
-    """The reading by which a camera films most of the field, and how many metres of markings; None: by none `least_m`.
+    """Return the reading by which a camera sees most metres of markings, and how many; None if below `least_m`.
 
     Corners come last: they are four more places, of which one now and then sees more by chance than what is meant.
     """
@@ -125,7 +125,7 @@ def _meant(field: FieldOfPlay, sent: PoseIn, camera: PosedCamera, least_m: float
 
 
 def _readings(field: FieldOfPlay, sent: PoseIn, stored: Pose) -> Iterator[_Reading]:
-    """What else a pose may mean. No rotation in degrees is among them: those of fields' cameras are beyond 10."""
+    """Yield other meanings of a pose. Rotations in degrees are none: those of fields' cameras are beyond 10."""
     backwards = [-component for component in sent.rotation]
     inverse = "its rotation goes from camera to world: send the inverse, world to camera (the negative of the vector)"
     if sent.translation is not None:
@@ -149,7 +149,7 @@ def _in_feet(stored: Pose) -> _Reading:
 
 
 def _from_corners(field: FieldOfPlay, stored: Pose) -> Iterator[_Reading]:
-    """The place as if it were counted from each corner of the field; from which one, the field cannot tell."""
+    """Yield the position as if it were counted from each corner; the field is symmetric and cannot tell which."""
     x, y, z = stored.position
     for corner_x, corner_y in itertools.product(*((-side / 2, side / 2) for side in (field.length_m, field.width_m))):
         reading = Pose.from_position(stored.rotation, [x + corner_x, y + corner_y, z])
@@ -158,7 +158,7 @@ def _from_corners(field: FieldOfPlay, stored: Pose) -> Iterator[_Reading]:
 
 
 def _films_a_field(pose: Pose) -> bool:
-    """Whether a camera stands near a field, above it, and upright or looking straight down."""
+    """True if a camera stands near a field, above it, and upright or looking straight down."""
     right, down, forward = rotate(pose.rotation, [0.0, 0.0, 1.0])
     if abs(forward) > STRAIGHT_DOWN:
         return _is_near(pose) and forward < 0
@@ -166,19 +166,19 @@ def _films_a_field(pose: Pose) -> bool:
 
 
 def _hangs_over(field: FieldOfPlay, pose: Pose) -> bool:
-    """Whether a camera would hang above the field itself and look along it, as none does that is not at a ceiling."""
+    """True if a camera would hang above the field itself and look along it, which only cameras at a ceiling do."""
     x, y, _ = pose.position
     _, _, forward = rotate(pose.rotation, [0.0, 0.0, 1.0])
     return abs(x) < field.length_m / 2 and abs(y) < field.width_m / 2 and forward > -STEEP
 
 
 def _is_usual_place(field: FieldOfPlay, pose: Pose) -> bool:
-    """Whether a camera stands no farther beside a field, and no higher, than those do that film it."""
+    """True if a camera stands no farther from a field, and no higher, than cameras usually do."""
     return _beside_m(field, pose) <= USUALLY_BESIDE_M and pose.position[2] <= USUALLY_HIGH_M
 
 
 def _beside_m(field: FieldOfPlay, pose: Pose) -> float:
-    """How far it is from a camera to the field, on the ground, in metres."""
+    """Return the distance from a camera to the field on the ground, in metres."""
     x, y, _ = pose.position
     return math.hypot(max(0.0, abs(x) - field.length_m / 2), max(0.0, abs(y) - field.width_m / 2))
 
@@ -189,7 +189,7 @@ def _is_near(pose: Pose) -> bool:
 
 
 def _is_exchanged(camera: PosedCamera) -> bool:
-    """Whether the camera matrix is one of a picture whose height is this one's width."""
+    """True if the camera matrix belongs to a picture with width and height exchanged."""
     (_, _, cx), (_, _, cy), _ = camera.intrinsics.matrix
     width, height = camera.image_size
     return max(_off(cx, width), _off(cy, height)) > OFF_CENTRE and max(_off(cx, height), _off(cy, width)) < CENTRED

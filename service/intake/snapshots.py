@@ -22,19 +22,19 @@ from service.settings import Settings
 
 # Beyond the time that the sources have: to start, and to encode.
 STARTING_S = 10.0
-# Of this process: each keeps a thread busy.
+# In this process: each keeps a thread busy.
 AT_ONCE = 8
-# Of the time that a source had: what took as much of it was ended by it.
+# Part of the time that a source had: a fetch that took as much was ended by the limit.
 LATE = 0.9
 log = structlog.get_logger()
 
 
 class SourceLate(Problem):
-    """A source gave no frame within the time that it had; with more time it might have."""
+    """Problem of a source that gave no frame within its time; with more time it might have."""
 
 
 class Snapshots:
-    """Takes frames, of a venue's cameras at once; `count` is told how long each source took."""
+    """Fetches frames of a venue's cameras at once; `count` is called with the duration of each fetch."""
 
     def __init__(self, settings: Settings, count: Callable[[Sequence[SourceFetch]], None]) -> None:
         self._settings = settings
@@ -141,7 +141,7 @@ class Snapshots:
 
 
 def _without(credentials: Mapping[str, str], text: str) -> str:
-    """What native code says may repeat an address whole."""
+    """Return text of native code without secrets: it may repeat an address whole."""
     for secrets in credentials.values():
         text = SourceSecrets.decoded(secrets).redact(text)
     return text

@@ -1,4 +1,4 @@
-"""The way of frames into the service: stored, then a job, or the job that they already are."""
+"""Intake of submissions: their frames are stored, and become a job unless they are one already."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from service.store.database import DATABASE_OUTAGES
 from service.store.expiry import ExpiryRepository
 from service.store.jobs.attempts import Enqueue
 from service.store.jobs.files import frame_folder, frame_path
-from service.store.jobs.submission import Submission, SubmissionRefused, SubmissionRepository
+from service.store.jobs.submission import Submission, SubmissionRepository
 from service.store.jobs.task import Origin
 
 # Longer than any upload takes from its first stored frame to its job.
@@ -41,7 +41,7 @@ class Intake:
     def take(self, submission: Submission, store: Callable[[], None]) -> tuple[Job, bool]:
         """Store the files of a checked submission and make it a job, or find the job it already is; says if it is new.
 
-        `store` puts them where the submission says. Raises a `SubmissionRefused`, and a `Problem` that `store` raises.
+        `store` puts them where the submission says. Raises a `Problem` where the submission is refused.
         """
         # Storing costs more than asking: the place in the queue too, which the transaction of the job asks for again.
         known = self._submissions.announce(submission, self._settings.queue_limit, UPLOAD_GRACE)
@@ -50,7 +50,7 @@ class Intake:
         try:
             store()
             job, new = self._submissions.submit(submission, self._settings.queue_limit, self._enqueue)
-        except (SubmissionRefused, Problem):
+        except Problem:
             self._take_back(submission.job_id)
             raise
         if not new:
@@ -59,11 +59,11 @@ class Intake:
         return job, new
 
     def require_place(self, origin: Origin) -> None:
-        """Raise `QueueFull` if as many jobs wait as may, or all other places are kept for schedules."""
+        """Raise the problem `queue-full` if no place is free, or those that are free are kept for schedules."""
         self._submissions.require_place(self._settings.queue_limit, is_schedule=origin.is_schedule)
 
     def _take_back(self, job_id: str) -> None:
-        """Delete what was stored of a submission that became no job, and take it off the list of what is to be."""
+        """Delete the frames of a submission that became no job, and the note that their folder is to be deleted."""
         folder = frame_folder(job_id)
         self._blobs.delete_under(folder)
         # While the database is away it stays on the list, and there is nothing left to delete.

@@ -68,8 +68,8 @@ def job(job_id: JobIdPath, request: Request, context: InContext) -> Response:
         formats=get_args(FormatName),
         outcome=outcome_of(context, found, poses_in_use(context, found.venue)),
         sizes=sizes_of(venue),
-        adoptable=context.adopted_fields.adoptable(job_id),
-        can_take=found.kind == "find" and context.found_venues.is_adoptable(job_id),
+        adoptable=context.adoption.adoptable_numbers(job_id),
+        can_take=found.kind == "find" and context.adoption.can_adopt_found(job_id),
         is_stored=found.venue is not None and context.venues.exists(found.venue),
         # A new venue has those cameras alone that the search had frames of.
         has_every_frame=bool(found.frames) and (venue is None or venue.poses.keys() <= found.frames.keys()),

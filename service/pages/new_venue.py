@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from itertools import count
 from typing import Annotated, Any, get_args
 
 from fastapi import APIRouter, Query, Request, Response
@@ -17,7 +16,6 @@ from service.routes.contract.guarded import Guarded
 from service.schemas.field import FieldOfPlay
 from service.schemas.names import ID_PATTERN, LensModel
 from service.schemas.programs.clicked_pose import ClickedPose, ClickedPoseRequest
-from service.store.jobs.queries import JobPage
 
 ARC_STEP_RAD = math.radians(4)
 router = APIRouter(route_class=Page, include_in_schema=False)
@@ -43,25 +41,14 @@ def _described(request: Request, context: Context, template: str) -> Response:
         templates=NAMES,
         models=get_args(LensModel),
         most=round(context.settings.max_frame_mb * 1e6),
-        free_id=_free_id(context),
+        free_id=context.venues.free_id(),
     )
-
-
-def _free_id(context: Context) -> str:
-    """An id that no venue has and no search was for, of which a venue can still be made: for those who do not care."""
-    names = (f"venue-{number}" for number in count(1))
-    return next(name for name in names if context.venues.get(name) is None and not _has_jobs(context, name))
-
-
-def _has_jobs(context: Context, venue_id: str) -> bool:
-    found = context.jobs.summaries(JobPage(1, venue=venue_id))
-    return bool(found.summaries or found.unreadable)
 
 
 @data.get("/free", openapi_extra=needs_scope("read"))
 def free_id(context: InContext) -> dict[str, str]:
     """Propose an id for a new venue, for a page on which the one that it was given may have been taken meanwhile."""
-    return {"id": _free_id(context)}
+    return {"id": context.venues.free_id()}
 
 
 @data.get("/taken", openapi_extra=needs_scope("read"))

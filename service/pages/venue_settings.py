@@ -8,15 +8,16 @@ from typing import get_args
 from fastapi import APIRouter, Request, Response
 
 from fields.template import NAMES
-from service.api import etags
 from service.api.context import InContext
 from service.pages.alarm_suggestions import suggested_limits
 from service.pages.page_rendering import Page, render_page
 from service.routes.contract.documented import needs_scope
-from service.routes.venues import ExistingVenue, venue_etag
+from service.routes.venues import ExistingVenue
+from service.schemas import etags
 from service.schemas.geometry import Intrinsics
 from service.schemas.health import Alarms
 from service.schemas.names import LensModel
+from service.store.preconditions import venue_etag
 
 # The last so many calibrations and revisions say what is usual: three months of nights.
 SUGGESTED_BY = 100

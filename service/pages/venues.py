@@ -10,7 +10,6 @@ from typing import Annotated, Any, Literal, get_args
 
 from fastapi import APIRouter, Query, Request, Response
 
-from service.api import etags
 from service.api.context import InContext, VenueIdPath
 from service.pages.live import CLOCKS, STATUSES, live_card
 from service.pages.outcome import CAME_BY, outcome_of, poses_in_use
@@ -20,13 +19,15 @@ from service.routes.contract.attribution import hide_other_actor
 from service.routes.contract.documented import needs_scope
 from service.routes.contract.guarded import Guarded
 from service.routes.contract.restricted import OnlyVenues, lists_by_venue
-from service.routes.venues import ExistingVenueId, existing_venue, venue_etag
+from service.routes.venues import ExistingVenueId, existing_venue
+from service.schemas import etags
 from service.schemas.health import Alarm, VenueHealth
 from service.schemas.history import Cause, Revision
 from service.schemas.job import Job
 from service.schemas.names import ID_PATTERN, FormatName
 from service.schemas.venue import Venue
 from service.schemas.view import ViewChoice
+from service.store.preconditions import venue_etag
 from service.store.repositories import Repositories
 from service.store.statistics.venue_summary import CalibrationSummary
 from service.store.unreadable import UnreadableRow
@@ -145,7 +146,7 @@ def _venue_page(venue_id: str, request: Request, context: InContext) -> Response
         came_by=CAME_BY,
         undone=undone_jobs(revisions),
         sizes=sizes_of(stored),
-        adoptable=context.adopted_fields.adoptable(job.id) if job else {},
+        adoptable=context.adoption.adoptable_numbers(job.id) if job else {},
         restorable=context.venues.restorable(stored, [one.revision for one in revisions]),
         kept_jobs=kept_jobs(context, revisions, health),
         trends=[context.trends.of(stored, camera.id, a_year_ago) for camera in stored.cameras],

@@ -1,1 +1,1 @@
-"""The addresses of the HTTP interface, one resource a file."""
+"""Routes of the HTTP interface, one module for each resource."""

@@ -1,4 +1,4 @@
-"""The documentation in a browser: files of the package, nothing from the internet, so it works where there is none."""
+"""API documentation in a browser, from files of the package: it needs no internet."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ POLICY = (
 
 @router.get("", openapi_extra=FOR_ALL)
 async def page(context: InContext) -> Response:
-    """The page; where no key is asked for, it does not speak of any."""
+    """Return the page; where the service asks for no keys, it does not mention any."""
     text = (FILES / "index.html").read_text(encoding="utf-8")
     if not await context.authenticator.asks_for_keys():
         text = text.replace('allow-authentication="true"', 'allow-authentication="false"')
@@ -33,7 +33,7 @@ async def page(context: InContext) -> Response:
 
 @router.get("/rapidoc-min.js", openapi_extra=FOR_ALL)
 async def script() -> FileResponse:
-    """What draws it: RapiDoc 9.3.8."""
+    """Return RapiDoc 9.3.8, which draws the page."""
     return FileResponse(FILES / "rapidoc-min.js", media_type="text/javascript")
 
 
@@ -45,5 +45,5 @@ async def scheme() -> FileResponse:
 
 @router.get("/LICENSE.txt", openapi_extra=FOR_ALL)
 async def licence() -> FileResponse:
-    """Of that script."""
+    """Return the licence of RapiDoc."""
     return FileResponse(FILES / "LICENSE.txt", media_type="text/plain")

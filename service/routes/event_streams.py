@@ -1,4 +1,4 @@
-"""Following a venue: its poses now, and from then on whatever happens to it, as server-sent events."""
+"""Stream of a venue's events (server-sent events): its poses now, then every change."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from service.routes.contract.attribution import hide_other_actor
 from service.routes.contract.documented import needs_scope, problem_responses
 from service.routes.contract.followed import FOLLOWER_SLOT, LONGEST_S
 from service.routes.contract.guarded import Guarded
-from service.routes.contract.missing import no_such_venue
 from service.schemas.events.venue_event import FINAL_EVENT
 from service.schemas.names import EVENT_KINDS, EventKind
 from service.store.database import DATABASE_OUTAGES
 from service.store.events.feed import NumberedEvent
+from service.store.refusals import no_such_venue
 from service.store.unreadable import UnreadableRow
 
 log = structlog.get_logger()
@@ -29,14 +29,14 @@ router = APIRouter(tags=["venues"], route_class=Guarded)
 PAGE = 50
 # Between two looks, should one that was waited for be missed; the stream itself says ": ping" every 15 s.
 LONGEST_POLL_INTERVAL_S = 30
-# Of 64 bits.
+# Digits of a number of 64 bits.
 LONGEST_NUMBER = 19
 
 
 def _last_seen_number(
     last_event_id: Annotated[str | None, Header(description="The id of the last event that arrived.")] = None,
 ) -> int | None:
-    """The number of the last event that a client has seen; what is no number was given by nobody here."""
+    """Return the number of the last event that a client has seen, None if it sends no number of ours."""
     given = last_event_id or ""
     return int(given) if given.isascii() and given.isdecimal() and len(given) < LONGEST_NUMBER else None
 
@@ -45,7 +45,7 @@ LastSeenNumber = Annotated[int | None, Depends(_last_seen_number)]
 
 
 def _followed_venue(venue_id: VenueIdPath, context: InContext, seen: LastSeenNumber) -> str:
-    """The id of a venue that is there, or whose end the client has not heard yet."""
+    """Return the id of a venue that is stored, or whose deletion the client has not seen yet."""
     if context.venues.get(venue_id) is None and not (seen is not None and context.events.ends_after(venue_id, seen)):
         raise no_such_venue(venue_id)
     return venue_id

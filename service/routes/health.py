@@ -1,4 +1,4 @@
-"""Is it alive, is it ready, how is it doing, and what do its problems mean."""
+"""Health, readiness and metrics of the service, and the meaning of its problems."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Jobs: how far they are, how they ended, what they look like."""
+"""Jobs: their progress, results and decisions about them."""
 
 from __future__ import annotations
 
@@ -17,21 +17,18 @@ from service.routes.contract.attribution import hide_other_asker
 from service.routes.contract.documented import needs_scope, problem_responses
 from service.routes.contract.exported import DOCUMENTS, ExportQuery, export_response, with_refined_poses
 from service.routes.contract.guarded import Guarded
-from service.routes.contract.missing import no_such_job
 from service.routes.contract.paged import NEXT_PAGE, next_page
 from service.routes.contract.restricted import OnlyVenues, lists_by_venue
 from service.routes.contract.tagged import TAGGED, IfNoneMatch, tagged_response
-from service.routes.venues import RETRY_AFTER_S, revision_unfit, venue_moved_on
 from service.schemas.job import Job, Jobs
 from service.schemas.names import ID_PATTERN, JOB_ID_PATTERN, OPEN_STATUSES, FormatName, JobKind, JobStatus, ListFields
 from service.schemas.problems import Problem
 from service.schemas.results import Result
 from service.store.blobs import BLOB_OUTAGES
 from service.store.database import DATABASE_OUTAGES
-from service.store.jobs.decisions import NoPoses, VenueHasChanged
 from service.store.jobs.files import frame_folder, pictures_folder
 from service.store.jobs.queries import JobPage, JobState
-from service.store.revisions import RevisionUnfit
+from service.store.refusals import RETRY_AFTER_S, no_poses, no_such_job
 
 log = structlog.get_logger()
 router = APIRouter(prefix="/jobs", tags=["jobs"], route_class=Guarded)
@@ -44,7 +41,7 @@ EVENT_AT_LEAST_EVERY_S = 10
 
 
 def job_response(job: Job, *, status: int = 200, if_none_match: str | None = None) -> Response:
-    """The one form a job leaves in: body, ETag, Location of a new one, Retry-After while it is open."""
+    """Return a job as response: body, ETag, Location of a new one, Retry-After while it is open."""
     body = hide_other_asker(job).model_dump_json().encode()
     answer = tagged_response(body, if_none_match, lambda: Response(body, status, media_type="application/json"))
     if job.open:
@@ -55,7 +52,7 @@ def job_response(job: Job, *, status: int = 200, if_none_match: str | None = Non
 
 
 async def wait_for_end(context: Context, job: Job, wait_s: float) -> Job:
-    """The job when it has ended, or as it is after the time that somebody waits."""
+    """Return a job once it has ended, or as it is after `wait_s`."""
     if not wait_s or not job.open:
         return job
     await context.job_watch.until(job.id, lambda state: state.status not in OPEN_STATUSES, min(wait_s, LONGEST_WAIT_S))
@@ -65,19 +62,19 @@ async def wait_for_end(context: Context, job: Job, wait_s: float) -> Job:
 async def _existing_job(job_id: JobIdPath, context: InContext) -> Job:
     job = await context.reads.get(job_id)
     if job is None:
-        raise no_such_job(context.settings)
+        raise no_such_job(context.settings.keep_jobs_days)
     return job
 
 
 def _existing_state(job_id: JobIdPath, context: InContext) -> JobState:
     state = context.jobs.states([job_id]).get(job_id)
     if state is None:
-        raise no_such_job(context.settings)
+        raise no_such_job(context.settings.keep_jobs_days)
     return state
 
 
 ExistingJob = Annotated[Job, Depends(_existing_job)]
-# Also of a job that cannot be read.
+# The job need not be readable.
 ExistingState = Annotated[JobState, Depends(_existing_state)]
 
 
@@ -165,15 +162,15 @@ def accept_job(
     by: ByActor,
     camera: Annotated[str | None, Query(pattern=ID_PATTERN, description="One camera; absent: all.")] = None,
 ) -> Response:
-    """Let the poses of a calibration hold that the gate rejected, or that was a dry run. Nothing changes if they do.
+    """Store the poses of a calibration that the gate rejected, or that was a dry run, unless they are stored already.
 
     Only while the venue is as the calibration found or left it.
     """
     ids = [one.id for one in job.result.cameras] if isinstance(job.result, Result) else []
     if camera is not None and ids and camera not in ids:
         raise Problem("poses-not-found", f"It found those of {', '.join(ids)}.", camera=camera, expected=ids)
-    cameras = None if camera is None else [camera]
-    return _decide(context, job, lambda job_id: context.decisions.accept(job_id, cameras, by))
+    context.decisions.accept(job.id, None if camera is None else [camera], by)
+    return job_response(context.jobs.get(job.id) or job)
 
 
 @router.post(
@@ -183,34 +180,12 @@ def accept_job(
     responses=problem_responses(404, 409),
 )
 def reject_job(job: ExistingJob, context: InContext, by: ByActor) -> Response:
-    """Put back what was before the poses of a calibration. Nothing changes if they never held or were put back.
+    """Restore the poses from before a calibration. Nothing changes if its own were never stored or are no more.
 
     Only while they are the last that came; to go back further, `POST /venues/{id}/restore`.
     """
-    return _decide(context, job, lambda job_id: context.decisions.reject(job_id, by))
-
-
-def _decide(context: Context, job: Job, decide: Callable[[str], None]) -> Response:
-    try:
-        decide(job.id)
-    except NoPoses:
-        raise _nothing_to_decide(job) from None
-    except VenueHasChanged as moved:
-        raise venue_moved_on(job.venue, job.id, moved) from None
-    except RevisionUnfit as unfit:
-        raise revision_unfit(unfit) from None
+    context.decisions.reject(job.id, by)
     return job_response(context.jobs.get(job.id) or job)
-
-
-def _nothing_to_decide(job: Job) -> Problem:
-    if job.kind != "find":
-        return _no_poses(job)
-    detail = f"It stores nothing by itself: POST /venues/{job.venue}/adopt-found takes what it found."
-    return Problem("poses-not-found", detail, job=job.id)
-
-
-def _no_poses(job: Job) -> Problem:
-    return Problem("poses-not-found", "It has not found any yet." if job.open else "It found none.", job=job.id)
 
 
 async def _require_unseen_events(
@@ -218,7 +193,7 @@ async def _require_unseen_events(
     context: InContext,
     last_event_id: Annotated[str | None, Header(description="The id of the last event that arrived.")] = None,
 ) -> None:
-    """A browser connects again after the end, and again: 204 is how it is told that there is no more."""
+    """Answer 204 to a client that has seen the end: browsers reconnect until they get it."""
     if job.open or last_event_id is None:
         return
     state = await _state(context, job)
@@ -246,7 +221,7 @@ async def job_events(job: ExistingJob, context: InContext) -> AsyncIterable[Serv
             job = await _read_again(context, job)
         except DATABASE_OUTAGES:
             # The client connects again, as after any stream that broke off.
-            log.warning("cannot tell of a job", exc_info=True)
+            log.warning("cannot read a job for its event stream", exc_info=True)
             return
         number = None if state is None else str(state.revision)
         yield ServerSentEvent(data=hide_other_asker(job), event="progress" if job.open else "end", id=number)
@@ -270,10 +245,10 @@ def job_poses(
     """Export the poses that a job found, accepted or not, to another tool's format."""
     venue = context.jobs.posed(job.id)
     if venue is None:
-        raise _no_poses(job)
+        raise no_poses(job)
     if wanted.lens == "refined":
         why_none = "its lines do not determine a lens, or the job is one of an earlier release."
-        venue = with_refined_poses(venue, context.refined.of_job(job.id), wanted.camera, why_none)
+        venue = with_refined_poses(venue, context.adoption.refined_of_job(job.id), wanted.camera, why_none)
     return export_response(context, venue, f"{venue.id}-{job.id}", form, wanted)
 
 

@@ -1,4 +1,4 @@
-"""Live poses of a venue: the process that sends them reports here, and whoever looks after it sees how it is doing."""
+"""Reports about the live poses of a venue, from the process that sends them."""
 
 from __future__ import annotations
 
@@ -17,11 +17,8 @@ from service.api.context import InContext, VenueIdPath
 from service.routes.contract.documented import needs_scope, problem_responses
 from service.routes.contract.followed import FOLLOWER_SLOT, LONGEST_S
 from service.routes.contract.guarded import Guarded
-from service.routes.contract.missing import no_such_venue
 from service.routes.venues import ExistingVenue
 from service.schemas.live import LONGEST_HISTORY_MIN, LiveHistory, LiveReport, LiveState
-from service.schemas.problems import Problem
-from service.schemas.venue import Venue
 from service.store.database import DATABASE_OUTAGES
 
 log = structlog.get_logger()
@@ -43,13 +40,7 @@ def report_live(venue_id: VenueIdPath, report: LiveReport, context: InContext) -
     The newest report is kept, and what all of them say by the minute. Counts are those since the last report that was
     answered. Twice the same counts are added twice.
     """
-
-    def allow(venue: Venue | None) -> None:
-        if venue is None:
-            raise no_such_venue(venue_id)
-        _require_known_cameras(venue, report)
-
-    context.live.report(venue_id, report, allow)
+    context.live.report(venue_id, report)
 
 
 @router.get("", openapi_extra=needs_scope("read"), responses=problem_responses(404))
@@ -100,10 +91,3 @@ def live_history(
 ) -> LiveHistory:
     """Tell how the live poses of a venue were doing, minute by minute, oldest first."""
     return LiveHistory(venue=venue.id, minutes=context.live.history(venue.id, minutes))
-
-
-def _require_known_cameras(venue: Venue, report: LiveReport) -> None:
-    ids = [camera.id for camera in venue.cameras]
-    for camera in report.cameras:
-        if camera.id not in ids:
-            raise Problem("unknown-camera", f"Report {', '.join(ids)}.", camera=camera.id, expected=ids)

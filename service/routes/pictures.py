@@ -1,4 +1,4 @@
-"""The pictures of jobs, and the layers that can be laid over them."""
+"""Pictures of jobs, and layers to lay over them."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ router = APIRouter(prefix="/jobs", tags=["jobs"], route_class=Guarded)
 
 CameraPath = Annotated[str, Path(pattern=ID_PATTERN)]
 PNG, JPEG = "image/png", "image/jpeg"
-# Name of the route, address below that of the job, what it shows. What is left of a suffix in the address, with an
-# underscore for each slash, is the picture's name.
+# Name of the route, address below that of the job, description. The picture's name is the address without its suffix,
+# with underscores for slashes.
 PICTURES = (
     ("preview", "preview.jpg", "Draw one wide view stitched from all cameras by the poses that were found."),
     ("preview_before", "preview/before.jpg", "Draw the stitched view by the poses that were stored."),

@@ -1,4 +1,4 @@
-"""What a camera shows now, fetched from its source."""
+"""Frame of what a camera shows now, fetched from its source."""
 
 from __future__ import annotations
 
@@ -10,10 +10,9 @@ from starlette.concurrency import run_in_threadpool
 from service.api.context import InContext, VenueIdPath
 from service.routes.contract.documented import BINARY, needs_scope, problem_responses
 from service.routes.contract.guarded import Guarded
-from service.routes.contract.missing import no_such_venue
-from service.routes.venues import camera_of
 from service.schemas.file_kinds import PNG_START
 from service.schemas.names import ID_PATTERN
+from service.store.refusals import camera_of, no_such_venue
 
 router = APIRouter(tags=["venues"], route_class=Guarded)
 PICTURE: dict[int | str, dict[str, Any]] = {200: {"content": {"image/jpeg": BINARY, "image/png": BINARY}}}
@@ -28,7 +27,7 @@ PICTURE: dict[int | str, dict[str, Any]] = {200: {"content": {"image/jpeg": BINA
 async def snapshot(
     venue_id: VenueIdPath, camera: Annotated[str, Path(pattern=ID_PATTERN)], context: InContext
 ) -> Response:
-    """Fetch a frame of a camera from its source, as it comes. Those who ask within two seconds get the same."""
+    """Fetch a frame of a camera from its source, as it comes. Requests within two seconds get the same."""
     found = await run_in_threadpool(context.venues.with_credentials, venue_id)
     if found is None:
         raise no_such_venue(venue_id)

@@ -1,4 +1,4 @@
-"""The stitched view of a venue for other tools, and a preview of it."""
+"""Stitched view of a venue for other tools, and its preview."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from typing import Annotated, Any, Literal
 from fastapi import APIRouter, Depends, Query, Request, Response
 from starlette.concurrency import run_in_threadpool
 
-from service.api import etags
 from service.api.context import Context, InContext
 from service.api.programs.drawings import drawable_frame
 from service.routes.contract.documented import BINARY, header_docs, needs_scope, problem_responses
 from service.routes.contract.guarded import Guarded
 from service.routes.contract.tagged import TAGGED, IfNoneMatch, tagged_response
 from service.routes.venues import ExistingVenue
+from service.schemas import etags
 from service.schemas.names import Projection, StitchFormat
 from service.schemas.problems import Problem
 from service.schemas.programs.stitching import StitchRequest
@@ -23,7 +23,7 @@ from service.schemas.venue import Venue
 from service.schemas.view import FieldOfView, Height, Horizon, Pan, ViewChoice, Width
 
 router = APIRouter(prefix="/venues", tags=["venues"], route_class=Guarded)
-# Of the files of a package: whoever has one of another edition fetches it anew.
+# Edition of the files of a package: clients that have another one fetch it anew.
 EDITION = 1
 JPEG, ZIP = "image/jpeg", "application/zip"
 Auto = Literal["auto"]
@@ -32,7 +32,7 @@ OR_AUTO = "`auto`: as it suits the cameras, whatever the venue's view says."
 
 @dataclass(frozen=True)
 class ViewQuery:
-    """What a request wants otherwise than the venue's view has it; `auto` in place of a number: as it suits."""
+    """Changes of the venue's view in a query; `auto` in place of a number: as it suits the cameras."""
 
     projection: Annotated[Projection | None, Query(description="Absent, like all parts: as the venue's view.")] = None
     width_px: Annotated[Width | None, Query(description="Even.")] = None
@@ -42,7 +42,7 @@ class ViewQuery:
     horizon: Annotated[Horizon | Auto | None, Query(description=f"0: top, 1: bottom. {OR_AUTO}")] = None
 
     def of(self, venue: Venue) -> ViewChoice:
-        """The view that is meant."""
+        """Return the view of a venue with these changes."""
         given = {name: value for name, value in vars(self).items() if value is not None}
         changes = {name: None if value == "auto" else value for name, value in given.items()}
         return (venue.view or ViewChoice()).but(changes)
@@ -75,7 +75,7 @@ async def stitch_package(
     asked = context.stitches.asked(venue, revision, view=view.of(venue), wanted=form, tag="")
     made_of = _made_of(asked)
     tag = etags.of(made_of)
-    if if_none_match is not None and etags.matches_weakly(if_none_match, tag):
+    if if_none_match is not None and etags.matches(if_none_match, tag, weakly=True):
         return tagged_response(made_of, if_none_match, Response)
     key = request.state.key
     content = await context.stitches.package(
@@ -109,7 +109,7 @@ async def stitch_preview(
     job = await run_in_threadpool(context.past_calibrations.last_taken, venue.id)
     made_of = _made_of(asked) + (job or "").encode()
     tag = etags.of(made_of)
-    if if_none_match is not None and etags.matches_weakly(if_none_match, tag):
+    if if_none_match is not None and etags.matches(if_none_match, tag, weakly=True):
         return tagged_response(made_of, if_none_match, Response)
     frames = await run_in_threadpool(_frames, context, venue, job)
     picture = await context.stitches.preview(asked, frames)
@@ -117,7 +117,7 @@ async def stitch_preview(
 
 
 def _made_of(asked: StitchRequest) -> bytes:
-    """All that a package or picture follows from, but for the machine and its frames."""
+    """Return all that a package or picture depends on, without frames, threads and tag."""
     parts: dict[str, Any] = asked.model_dump(mode="json", exclude={"threads", "tag", "sizes"})
     return json.dumps([EDITION, parts]).encode()
 
@@ -127,7 +127,7 @@ def _revision(context: Context, venue: Venue) -> int:
 
 
 def _frames(context: Context, venue: Venue, job: str | None) -> dict[str, bytes]:
-    """A frame of each camera, from those of a job."""
+    """Return a frame of each camera, from those of a job; raises the problem `no-frames`."""
     drawable = None if job is None else context.jobs.drawable(job)
     pictures = None if job is None else context.jobs.pictures(job)
     sizes = {camera.id: camera.image_size for camera in venue.cameras}

@@ -1,16 +1,15 @@
-"""Venues: what is calibrated, with the poses that hold now."""
+"""Venues: fields and their cameras, with the poses in use."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime, time
 from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Body, Depends, Header, Path, Query, Request, Response
 from pydantic import ValidationError
 
-from service.api import etags
-from service.api.auth import require_scope
+from service.api.auth import missing_scope
 from service.api.context import ByActor, Context, InContext, VenueIdPath
 from service.api.problems import validation_problem
 from service.intake import sources
@@ -20,14 +19,13 @@ from service.routes.contract.exported import (
     DOCUMENTS,
     ExportQuery,
     export_response,
-    no_refined_pose,
     with_refined_poses,
 )
 from service.routes.contract.guarded import Guarded
-from service.routes.contract.missing import no_such_job, no_such_venue
 from service.routes.contract.paged import NEXT_PAGE, next_page
 from service.routes.contract.restricted import OnlyVenues, lists_by_venue
 from service.routes.contract.tagged import TAGGED, IfNoneMatch, json_response, tagged_response
+from service.schemas import etags
 from service.schemas.base import Day, Name
 from service.schemas.events import callback_urls
 from service.schemas.geometry import PoseIn
@@ -36,10 +34,10 @@ from service.schemas.history import AdoptField, AdoptFound, History, Restore
 from service.schemas.merge_patch import MEDIA_TYPE, apply_merge_patch
 from service.schemas.names import ID_PATTERN, FormatName, ListFields
 from service.schemas.problems import Problem
+from service.schemas.source_urls import SourceSecrets
 from service.schemas.trend import Trend
 from service.schemas.venue import (
     PATCH_EXAMPLES,
-    Camera,
     ChangedVenue,
     RestoredVenue,
     Venue,
@@ -48,17 +46,11 @@ from service.schemas.venue import (
     VenueSummary,
 )
 from service.settings import Settings
-from service.store.adopted_fields import NoSuchJob, NotAdoptable, NumberRefused
-from service.store.found_venues import CandidateNeeded, CandidateRefused, NoSuchCandidate, NothingFound
-from service.store.jobs.decisions import VenueHasChanged
-from service.store.refined import NoRefinedPose
-from service.store.revisions import NoSuchRevision, RevisionUnfit
-from service.store.venues import find_replaceable
+from service.store.preconditions import Precondition, venue_etag
+from service.store.refusals import camera_of, no_refined_since, no_such_venue
 
 router = APIRouter(prefix="/venues", tags=["venues"], route_class=Guarded)
-# While a job is open.
-RETRY_AFTER_S = 2
-# What a camera cannot be without; its id is the name that it is patched by.
+# Required parts of a camera; its id is the name that it is patched by.
 WHOLE_CAMERA = ("image_size", "intrinsics", "pose")
 PATCH_BODY: dict[str, Any] = {
     "requestBody": {
@@ -68,29 +60,8 @@ PATCH_BODY: dict[str, Any] = {
 }
 
 
-def venue_busy(job_id: str) -> Problem:
-    """Answer whose request a venue's active job is in the way of."""
-    return Problem(
-        "venue-busy",
-        f"Wait for job {job_id} of the same venue or cancel it.",
-        headers={"Retry-After": str(RETRY_AFTER_S), "Location": f"/jobs/{job_id}"},
-        job=job_id,
-    )
-
-
-def camera_of(venue: Venue, camera_id: str) -> Camera:
-    """One of its cameras."""
-    for camera in venue.cameras:
-        if camera.id == camera_id:
-            return camera
-    ids = [camera.id for camera in venue.cameras]
-    raise Problem(
-        "no-such-camera", f"Venue {venue.id} has the cameras {', '.join(ids)}.", camera=camera_id, expected=ids
-    )
-
-
 def existing_venue(venue_id: VenueIdPath, context: InContext) -> Venue:
-    """Return a venue that is there. Raises `UnreadableRow`."""
+    """Return a stored venue; raises `UnreadableRow`, and a problem if there is none."""
     venue = context.venues.get(venue_id)
     if venue is None:
         raise no_such_venue(venue_id)
@@ -104,34 +75,22 @@ def _existing_venue_id(venue_id: VenueIdPath, context: InContext) -> str:
 
 
 ExistingVenue = Annotated[Venue, Depends(existing_venue)]
-# Also of a venue that cannot be read.
+# The venue need not be readable.
 ExistingVenueId = Annotated[str, Depends(_existing_venue_id)]
 
 
-def no_refined_since(venue_id: str) -> str:
-    """Why a camera has no refined pose, and what to do."""
-    return (
-        "no calibration that found one was accepted since its pose, its lens or the field were put, or the job was "
-        f"deleted. POST /venues/{venue_id}/calibrate."
-    )
+async def _if_match(if_match: Annotated[str | None, Header()] = None) -> Precondition:
+    return Precondition(if_match)
 
 
-def revision_unfit(unfit: RevisionUnfit) -> Problem:
-    """Answer who puts a revision back that cannot hold."""
-    return Problem("revision-unfit", f"{unfit} PUT the venue with the poses that you want.")
+async def _either_match(
+    if_match: Annotated[str | None, Header()] = None, if_none_match: Annotated[str | None, Header()] = None
+) -> Precondition:
+    return Precondition(if_match, if_none_match)
 
 
-def venue_moved_on(venue_id: str | None, job_id: str, moved: VenueHasChanged) -> Problem:
-    """Return the problem of a decision about a job whose venue has changed since."""
-    newest = moved.newest
-    is_now = f"is at revision {newest.revision} ({newest.cause})" if newest else "is deleted"
-    return Problem(
-        "venue-moved-on",
-        f"Venue {venue_id} {is_now} or has another field by now. To go back to earlier poses restore their revision: "
-        f"GET /venues/{venue_id}/history lists them (esc venue history {venue_id}; esc venue restore {venue_id} N).",
-        job=job_id,
-        got=newest and newest.revision,
-    )
+IfMatch = Annotated[Precondition, Depends(_if_match)]
+CameraPath = Annotated[str, Path(pattern=ID_PATTERN)]
 
 
 @router.put(
@@ -149,23 +108,13 @@ def put_venue(
     response: Response,
     context: InContext,
     by: ByActor,
-    if_match: Annotated[str | None, Header()] = None,
-    if_none_match: Annotated[str | None, Header()] = None,
+    precondition: Annotated[Precondition, Depends(_either_match)],
 ) -> ChangedVenue:
     """Create or replace a venue. Its poses are where the next calibration starts."""
-    wanted = _check_venue(venue, venue_id, context.settings)
-
-    def change(before: Venue | None, known: dict[str, str]) -> tuple[Venue, dict[str, str]]:
-        _require_match(if_match, before)
-        tag = venue_etag(before) if before else None
-        if if_none_match is not None and etags.matches_weakly(if_none_match, tag):
-            raise Problem("venue-changed", "The venue is already there.", got=_quoted_tag(tag))
-        return wanted.with_callbacks_of(before), sources.secrets_of(wanted, venue.secrets, before, known)
-
-    stored, new = context.venues.change(venue_id, change, by, find_replaceable)
-    response.headers["ETag"] = etags.quoted(venue_etag(stored))
+    checked = _check_venue(venue, venue_id, context.settings)
+    stored, new = context.venues.put(checked, venue.secrets, precondition, by)
     response.status_code = 201 if new else 200
-    return _changed_venue([camera.pose for camera in venue.cameras], stored.with_hidden_callbacks())
+    return _changed_venue([camera.pose for camera in venue.cameras], _tagged(response, stored))
 
 
 @router.patch(
@@ -179,30 +128,25 @@ def patch_venue(
     response: Response,
     context: InContext,
     by: ByActor,
-    if_match: Annotated[str | None, Header()] = None,
+    precondition: IfMatch,
 ) -> ChangedVenue:
     """Change parts of a venue and leave the others as they are, the poses that were calibrated among them.
 
     A JSON merge patch (RFC 7396). `cameras` may be an object of camera ids: `{"cameras": {"left": {"source": "..."}}}`.
     """
 
-    def change(before: Venue | None, known: dict[str, str]) -> tuple[Venue, dict[str, str]]:
-        if before is None:
-            raise no_such_venue(venue_id)
-        _require_match(if_match, before)
+    def patched(before: Venue) -> tuple[Venue, Mapping[str, SourceSecrets]]:
         document = apply_merge_patch(_patch_target(before, patch), patch)
         try:
             venue = VenueIn.model_validate(document)
         except ValidationError as error:
             raise _misnamed_camera(before, patch) or validation_problem(error, VenueIn, document, "body") from None
-        stored = _check_venue(venue, venue_id, context.settings)
-        return stored.with_callbacks_of(before), sources.secrets_of(stored, venue.secrets, before, known)
+        return _check_venue(venue, venue_id, context.settings), venue.secrets
 
-    stored, _ = context.venues.change(venue_id, change, by)
-    response.headers["ETag"] = etags.quoted(venue_etag(stored))
+    stored = context.venues.patch(venue_id, patched, precondition, by)
     # Which of position and translation was once sent is not known: both are read.
     poses = [PoseIn.model_validate(camera.pose.model_dump()) for camera in stored.cameras]
-    return _changed_venue(poses, stored.with_hidden_callbacks())
+    return _changed_venue(poses, _tagged(response, stored))
 
 
 @router.get("", openapi_extra=needs_scope("read"), responses={200: {"headers": NEXT_PAGE}})
@@ -239,7 +183,7 @@ def list_venues(
     responses=TAGGED | problem_responses(404),
 )
 def get_venue(venue: ExistingVenue, if_none_match: IfNoneMatch = None) -> Response:
-    """Return a venue with the poses that hold now."""
+    """Return a venue with the poses in use."""
     body = venue.with_hidden_callbacks().model_dump_json().encode()
     return tagged_response(body, if_none_match, json_response(body))
 
@@ -256,9 +200,10 @@ def venue_poses(
     wanted: Annotated[ExportQuery, Depends()],
     form: Annotated[FormatName, Query(alias="format")] = "json",
 ) -> Response:
-    """Export the poses that hold now to another tool's format; with `lens=refined` those of the last accepted job."""
+    """Export the poses in use to another tool's format; with `lens=refined` those of the last accepted job."""
     if wanted.lens == "refined":
-        venue = with_refined_poses(venue, context.refined.of_venue(venue), wanted.camera, no_refined_since(venue.id))
+        refined = context.adoption.refined_of_venue(venue)
+        venue = with_refined_poses(venue, refined, wanted.camera, no_refined_since(venue.id))
     return export_response(context, venue, venue.id, form, wanted)
 
 
@@ -294,7 +239,7 @@ def venue_history(
 )
 def camera_trend(
     venue: ExistingVenue,
-    camera: Annotated[str, Path(pattern=ID_PATTERN)],
+    camera: CameraPath,
     context: InContext,
     since: Annotated[Day | None, Query(description="The first night to tell, a day of UTC; without it, all.")] = None,
     if_none_match: IfNoneMatch = None,
@@ -329,27 +274,15 @@ def restore_venue(
     response: Response,
     context: InContext,
     by: ByActor,
-    if_match: Annotated[str | None, Header()] = None,
+    precondition: IfMatch,
 ) -> RestoredVenue:
-    """Let the poses of a revision hold again, with their lenses and their ridge; that is a revision of its own.
+    """Restore the poses of a revision, with their lenses and their ridge; that is a revision of its own.
 
     The nights that cameras remember become those of that revision. Only the last four revisions with any have them
     still: `warnings` names the cameras whose memories begin anew. A venue that cannot be read is readable again.
     """
-
-    def allow(before: Venue | None) -> None:
-        if before is None:
-            raise no_such_venue(venue_id)
-        _require_match(if_match, before)
-
-    try:
-        restored, forgetful = context.venues.restore(venue_id, wanted.revision, allow, by)
-    except NoSuchRevision:
-        raise Problem("revision-not-found", f"GET /venues/{venue_id}/history lists those there are.") from None
-    except RevisionUnfit as unfit:
-        raise revision_unfit(unfit) from None
-    response.headers["ETag"] = etags.quoted(venue_etag(restored))
-    return RestoredVenue(**dict(restored.with_hidden_callbacks()), warnings=_lost_nights(wanted.revision, forgetful))
+    restored, forgetful = context.venues.restore(venue_id, wanted.revision, precondition, by)
+    return RestoredVenue(**dict(_tagged(response, restored)), warnings=_lost_nights(wanted.revision, forgetful))
 
 
 @router.post(
@@ -359,29 +292,17 @@ def restore_venue(
 )
 def adopt_refined(
     venue_id: VenueIdPath,
-    camera: Annotated[str, Path(pattern=ID_PATTERN)],
+    camera: CameraPath,
     response: Response,
     context: InContext,
     by: ByActor,
-    if_match: Annotated[str | None, Header()] = None,
+    precondition: IfMatch,
 ) -> Venue:
     """Store a camera's refined pose and lens of the last accepted calibration; that is a revision of its own.
 
     What is said of how well the lens is known (`sigma`) stays. Nothing changes if the camera has them already.
     """
-
-    def allow(before: Venue | None) -> None:
-        if before is None:
-            raise no_such_venue(venue_id)
-        camera_of(before, camera)
-        _require_match(if_match, before)
-
-    try:
-        adopted = context.refined.adopt(venue_id, camera, allow, by)
-    except NoRefinedPose:
-        raise no_refined_pose(camera, no_refined_since(venue_id)) from None
-    response.headers["ETag"] = etags.quoted(venue_etag(adopted))
-    return adopted.with_hidden_callbacks()
+    return _tagged(response, context.adoption.adopt_refined(venue_id, camera, precondition, by))
 
 
 @router.post(
@@ -395,7 +316,7 @@ def adopt_field(
     response: Response,
     context: InContext,
     by: ByActor,
-    if_match: Annotated[str | None, Header()] = None,
+    precondition: IfMatch,
 ) -> Venue:
     """Store a number of the field as the lines of an accepted calibration have it; that is a revision of its own.
 
@@ -403,29 +324,7 @@ def adopt_field(
     calibration moves them. What cameras remember of earlier nights ends, as with any other field. Nothing changes if
     the field has that number already.
     """
-
-    def allow(before: Venue | None) -> None:
-        if before is None:
-            raise no_such_venue(venue_id)
-        _require_match(if_match, before)
-
-    try:
-        adopted = context.adopted_fields.adopt(venue_id, wanted.job, wanted.name, allow, by)
-    except NoSuchJob:
-        raise no_such_job(context.settings) from None
-    except NotAdoptable as offers:
-        told = f"It offers {', '.join(offers.offered)}." if offers.offered else "It offers none."
-        raise Problem(
-            "field-number-not-found", told, job=wanted.job, expected=list(offers.offered), got=wanted.name
-        ) from None
-    except VenueHasChanged as moved:
-        raise venue_moved_on(venue_id, wanted.job, moved) from None
-    except NumberRefused as refused:
-        raise Problem(
-            "field-number-refused", f"{refused}. Measure the field again.", job=wanted.job, got=wanted.name
-        ) from None
-    response.headers["ETag"] = etags.quoted(venue_etag(adopted))
-    return adopted.with_hidden_callbacks()
+    return _tagged(response, context.adoption.adopt_number(venue_id, wanted.job, wanted.name, precondition, by))
 
 
 @router.post(
@@ -444,7 +343,7 @@ def adopt_found(
     response: Response,
     context: InContext,
     by: ByActor,
-    if_match: Annotated[str | None, Header()] = None,
+    precondition: IfMatch,
 ) -> Venue:
     """Store cameras that a job has found, lenses too, as a revision, or with an admin's key as a new venue.
 
@@ -453,55 +352,28 @@ def adopt_found(
     them. What the cameras remember of earlier nights ends. Nothing changes if they stand so already.
     `POST /jobs/{id}/calibrate` then calibrates the venue with the frames of the job.
     """
-
-    def allow(before: Venue | None) -> None:
-        _require_match(if_match, before)
-        if before is None:
-            require_scope(request.state.key, "admin")
-
-    try:
-        adopted, new = context.found_venues.adopt(venue_id, wanted.job, allow, wanted.candidates, by)
-    except NothingFound:
-        detail = f"Venue {venue_id} has no job of this id that looked for its cameras and ended."
-        raise Problem("poses-not-found", detail, job=wanted.job) from None
-    except NoSuchCandidate as error:
-        raise _no_such_candidate(error, wanted.job) from None
-    except CandidateNeeded as error:
-        raise Problem(
-            "candidate-needed",
-            f"Choose one of the candidates of {', '.join(error.cameras)}, or null to leave it out.",
-            job=wanted.job,
-            expected=list(error.cameras),
-        ) from None
-    except CandidateRefused as error:
-        raise Problem("candidate-refused", f"{error}.", job=wanted.job) from None
-    except VenueHasChanged as moved:
-        raise venue_moved_on(venue_id, wanted.job, moved) from None
-    response.headers["ETag"] = etags.quoted(venue_etag(adopted))
+    no_new_venue = missing_scope(request.state.key, "admin")
+    adopted, new = context.adoption.adopt_found(venue_id, wanted.job, wanted.candidates, precondition, by, no_new_venue)
     response.status_code = 201 if new else 200
-    return adopted.with_hidden_callbacks()
+    return _tagged(response, adopted)
 
 
 @router.delete(
     "/{venue_id}", openapi_extra=needs_scope("admin"), status_code=204, responses=problem_responses(404, 409, 412)
 )
-def delete_venue(
-    venue_id: VenueIdPath, context: InContext, by: ByActor, if_match: Annotated[str | None, Header()] = None
-) -> None:
+def delete_venue(venue_id: VenueIdPath, context: InContext, by: ByActor, precondition: IfMatch) -> None:
     """Forget a venue and the history of its poses. Its jobs stay, with frames and pictures: `DELETE /jobs/{id}`."""
+    context.venues.delete(venue_id, precondition, by)
 
-    def allow(before: Venue | None, active_job: str | None) -> None:
-        if before is None:
-            raise no_such_venue(venue_id)
-        if active_job is not None:
-            raise venue_busy(active_job)
-        _require_match(if_match, before)
 
-    context.venues.delete(venue_id, allow, by)
+def _tagged(response: Response, venue: Venue) -> Venue:
+    """Return a stored venue as clients see it, with its entity tag in the response."""
+    response.headers["ETag"] = etags.quoted(venue_etag(venue))
+    return venue.with_hidden_callbacks()
 
 
 def _lost_nights(revision: int, cameras: Sequence[str]) -> list[str]:
-    """Return what is to be said where a revision came back without nights that cameras remembered until now."""
+    """Return a warning if a restored revision has no memories of cameras that had some until now."""
     if not cameras:
         return []
     remember = f"camera {cameras[0]} remembers" if len(cameras) == 1 else f"cameras {', '.join(cameras)} remember"
@@ -511,17 +383,8 @@ def _lost_nights(revision: int, cameras: Sequence[str]) -> list[str]:
     ]
 
 
-def _no_such_candidate(error: NoSuchCandidate, job_id: str) -> Problem:
-    """Answer who names a candidate that is not there."""
-    if error.count is None:
-        detail = f"The job looked for {', '.join(error.sought)}."
-        return Problem("candidate-not-found", detail, job=job_id, camera=error.camera, expected=list(error.sought))
-    detail = f"Camera {error.camera} has {error.count} candidates."
-    return Problem("candidate-not-found", detail, job=job_id, camera=error.camera, expected=error.count)
-
-
 def _summaries(context: Context, venues: Sequence[Venue]) -> list[VenueSummary]:
-    """A line of each, with what is known of all of them at a glance."""
+    """Return a summary of each venue: its alarms and its last calibration."""
     ids = [venue.id for venue in venues]
     glances, alarms = context.venue_summaries.of(ids), context.venue_summaries.alarms(ids)
     return [
@@ -539,7 +402,10 @@ def _summaries(context: Context, venues: Sequence[Venue]) -> list[VenueSummary]:
 
 
 def _patch_target(venue: Venue, patch: dict[str, Any]) -> dict[str, Any]:
-    """A venue to be patched. A camera's place is said twice: where a patch moves the camera, it says it once."""
+    """Return a venue as the target of a patch.
+
+    A camera has its place twice, as position and as translation: the one that the patch does not name is left out.
+    """
     document: dict[str, Any] = venue.model_dump(mode="json")
     by_id = patch.get("cameras")
     for camera in document["cameras"]:
@@ -551,7 +417,7 @@ def _patch_target(venue: Venue, patch: dict[str, Any]) -> dict[str, Any]:
 
 
 def _misnamed_camera(venue: Venue, patch: dict[str, Any]) -> Problem | None:
-    """What to say of a patch for a camera that the venue does not have, and that is no whole one either."""
+    """Return the problem of a patch for a camera that the venue does not have, unless it is a whole new one."""
     by_id = patch.get("cameras")
     ids = [camera.id for camera in venue.cameras]
     for name, camera in by_id.items() if isinstance(by_id, dict) else ():
@@ -563,20 +429,20 @@ def _misnamed_camera(venue: Venue, patch: dict[str, Any]) -> Problem | None:
 
 
 def _changed_venue(poses: Sequence[PoseIn], shown: Venue) -> ChangedVenue:
-    """The answer to whoever changed a venue, with what it leaves to be assumed; `poses` of its cameras as sent."""
+    """Return the answer to a change of a venue, with warnings about its `poses`, which are given as sent."""
     from service.intake.pose_warnings import warnings_of
 
     return ChangedVenue.of(shown, warnings_of(poses, shown))
 
 
 def _check_venue(venue: VenueIn, venue_id: str, settings: Settings) -> Venue:
-    """A venue as it is kept, if this service can keep it at this address."""
+    """Return a venue as it is stored; raises a problem if this service cannot store it at this address."""
     if venue.id != venue_id:
         raise Problem("venue-id-mismatch", "Use one id.", expected=venue_id, got=venue.id)
     scheduled = None if venue.schedule is None else venue.schedule.options
-    for told in (venue.alarms, scheduled):
-        if told is not None and told.callback_url is not None:
-            callback_urls.check(told.callback_url, settings)
+    for caller in (venue.alarms, scheduled):
+        if caller is not None and caller.callback_url is not None:
+            callback_urls.check(caller.callback_url, settings)
     for webhook in venue.webhooks:
         callback_urls.check(webhook.url, settings, "webhooks")
     if venue.schedule is not None and venue.schedule.frames > settings.max_frames_per_camera:
@@ -589,22 +455,3 @@ def _check_venue(venue: VenueIn, venue_id: str, settings: Settings) -> Venue:
     stored = venue.to_venue()
     sources.check(stored, settings.sources)
     return stored
-
-
-def _require_match(if_match: str | None, before: Venue | None) -> None:
-    """Whoever changes a venue changes the one that he has seen."""
-    tag = venue_etag(before) if before else None
-    if if_match is not None and not etags.matches(if_match, tag):
-        raise Problem(
-            "venue-changed", "Read the venue again and decide.", expected=if_match[:200], got=_quoted_tag(tag)
-        )
-
-
-def _quoted_tag(tag: str | None) -> str | None:
-    """A tag as headers have it; None: there is no venue."""
-    return None if tag is None else etags.quoted(tag)
-
-
-def venue_etag(venue: Venue) -> str:
-    """By which it is known whether it changed."""
-    return etags.of(venue.with_hidden_callbacks().model_dump_json().encode())

@@ -6,7 +6,7 @@ report says since when the process is missed.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from functools import partial
@@ -16,10 +16,12 @@ import sqlalchemy as sa
 
 from service.schemas.base import TOLERANTLY
 from service.schemas.live import LiveCamera, LiveMinute, LiveMinuteCamera, LiveReport, LiveSender, LiveState
+from service.schemas.problems import Problem
 from service.schemas.venue import Venue
 from service.store import live_alarms, tables
 from service.store.database import Repository, advisory_lock, clock, reading, writing
 from service.store.documents import to_document
+from service.store.refusals import no_such_venue
 from service.store.statistics.counters import INSERT
 from service.store.unreadable import read_or, read_values
 from service.store.venues import find_venue, venue_lock
@@ -44,11 +46,17 @@ class LiveGauges:
 class LiveRepository(Repository):
     """The reports in the database."""
 
-    def report(self, venue_id: str, report: LiveReport, allow: Callable[[Venue | None], None]) -> None:
-        """Keep a report as the newest and add it to its minute, unless `allow` raises at the sight of the venue."""
+    def report(self, venue_id: str, report: LiveReport) -> None:
+        """Keep a report as the newest and add it to its minute.
+
+        Raises the problems `venue-not-found`, and `unknown-camera` for a camera that the venue does not have.
+        """
         with writing(self._engine) as connection:
             advisory_lock(connection, venue_lock(venue_id))
-            allow(find_venue(connection, venue_id))
+            venue = find_venue(connection, venue_id)
+            if venue is None:
+                raise no_such_venue(venue_id)
+            _require_known_cameras(venue, report)
             now = clock(connection)
             _keep_newest(connection, venue_id, report, now)
             _add_to_minute(connection, venue_id, report, now)
@@ -80,6 +88,13 @@ class LiveRepository(Repository):
             since = clock(connection) - timedelta(minutes=minutes)
             query = sa.select(tables.live_minutes).where(m.venue == venue_id, m.minute >= since).order_by(m.minute)
             return [_minute(row) for row in connection.execute(query)]
+
+
+def _require_known_cameras(venue: Venue, report: LiveReport) -> None:
+    ids = [camera.id for camera in venue.cameras]
+    for camera in report.cameras:
+        if camera.id not in ids:
+            raise Problem("unknown-camera", f"Report {', '.join(ids)}.", camera=camera.id, expected=ids)
 
 
 def live_gauges(connection: sa.Connection, most: int, now: datetime) -> list[LiveGauges]:

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from service.store.adopted_fields import AdoptedFieldRepository
+from service.store.adoption import AdoptionRepository
 from service.store.database import connect, migrate
 from service.store.events.feed import EventRepository
 from service.store.events.outbox import OutboxRepository
 from service.store.expiry import ExpiryRepository
-from service.store.found_venues import FoundVenueRepository
 from service.store.jobs.attempts import AttemptRepository
 from service.store.jobs.decisions import DecisionRepository
 from service.store.jobs.queries import JobRepository
 from service.store.jobs.submission import SubmissionRepository
 from service.store.keys import KeyRepository
 from service.store.live import LiveRepository
-from service.store.refined import RefinedPoseRepository
 from service.store.schedules import ScheduleRepository
 from service.store.sessions import SessionRepository
 from service.store.statistics.past_calibrations import PastCalibrationRepository
@@ -35,9 +33,7 @@ class Repositories:
         self.trends = TrendRepository(engine)
         self.live = LiveRepository(engine)
         self.schedules = ScheduleRepository(engine)
-        self.refined = RefinedPoseRepository(engine)
-        self.adopted_fields = AdoptedFieldRepository(engine)
-        self.found_venues = FoundVenueRepository(engine)
+        self.adoption = AdoptionRepository(engine)
         self.submissions = SubmissionRepository(engine)
         self.jobs = JobRepository(engine)
         self.attempts = AttemptRepository(engine)

@@ -1,4 +1,4 @@
-"""The history of venues: every state that their cameras were in. All SQL about it.
+"""History of venues as revisions, one for every state of their cameras. All SQL about it.
 
 A revision is written in the transaction that changes the venue, with how far each camera moved: reading a year of drift
 computes nothing.
@@ -21,6 +21,7 @@ from service.schemas.field import FieldOfPlay
 from service.schemas.geometry import Movement, PosedCamera
 from service.schemas.history import Cause, Revision
 from service.schemas.names import FieldNumber
+from service.schemas.problems import Problem
 from service.schemas.venue import Camera, Venue
 from service.store import tables
 from service.store.actors import actor_in, columns_of
@@ -31,34 +32,26 @@ from service.store.trends import begin_anchors, go_back
 from service.store.unreadable import MISSHAPEN, UnreadableRow, read_each, reading_row
 
 r = tables.revisions.c
-# Whose poses hold, or held.
+# Causes of revisions whose poses a calibration found.
 CALIBRATION_CAUSES: tuple[Cause, ...] = ("calibrated", "recovered", "accepted")
 JOB_CAUSES: tuple[Cause, ...] = (*CALIBRATION_CAUSES, "found")
-# By which cameras stand anew, whatever they did before.
+# Causes of revisions that begin the drift of moved cameras anew.
 PLACED_CAUSES: tuple[Cause, ...] = ("put", "found")
 FIELD_NUMBERS: tuple[FieldNumber, ...] = get_args(FieldNumber)
 NUMBERS_BESIDE_RIDGE: tuple[FieldNumber, ...] = ("length_m", "width_m")
-# Revisions that are tried, the newest: more are read only for a person who asks.
+# Newest revisions by which an unreadable venue is tried to be salvaged.
 MOST_SALVAGED = 100
-# Numbers of a field that revisions have changed: `NumberChange` by name, with the number of the revision.
+# Changes of the field's numbers: the number of a revision, with `NumberChange` by name.
 Changes = Sequence[tuple[int, dict[str, dict[str, float]]]]
 
 
 @dataclass(frozen=True)
 class RevisionPage:
-    """Revisions of a page, newest first, those that cannot be read, and the number that the next page is before."""
+    """Page of revisions, newest first, those that cannot be read, and the number before which the next page begins."""
 
     revisions: list[Revision]
     unreadable: list[Unreadable]
     next_cursor: int | None
-
-
-class NoSuchRevision(Exception):  # noqa: N818
-    """The venue never had one of this number."""
-
-
-class RevisionUnfit(Exception):  # noqa: N818
-    """The venue is no longer one that the revision fits; the message says why."""
 
 
 def add_revision(
@@ -72,10 +65,9 @@ def add_revision(
     by: Actor | None = None,
     field_before: FieldOfPlay | None = None,
 ) -> int:
-    """Write down the state that a venue has now, inside the caller's serialised transaction.
+    """Add the present state of a venue as a revision, inside the caller's serialised transaction; return its number.
 
-    `field_before`: of a revision that changes numbers of the field, the field without that change; undoing the revision
-    gives them back. Gives the number of the revision.
+    `field_before`: the field before a revision that changes its numbers, so that undoing the revision restores them.
     """
     before, at = _newest_row_by(connection, quality), quality.now
     number = 1 if before is None else before.number + 1
@@ -119,19 +111,19 @@ def add_revision(
 
 
 def newest_revision(connection: sa.Connection, venue_id: str) -> Revision | None:
-    """The one that holds, inside the caller's transaction."""
+    """Return the revision in use, inside the caller's transaction."""
     row = _newest_row(connection, venue_id)
     return None if row is None else _revision(row)
 
 
 def newest_known(connection: sa.Connection, quality: VenueQuality) -> Revision | None:
-    """The one that holds, read once in a transaction."""
+    """Return the revision in use, read once in a transaction."""
     row = _newest_row_by(connection, quality)
     return None if row is None else _revision(row)
 
 
 def revision_at(connection: sa.Connection, venue_id: str, number: int) -> datetime:
-    """When a revision came, or the oldest after it that is kept; the first one came with the venue."""
+    """Return the time of a revision, or of the oldest after it that is kept."""
     query = sa.select(r.at).where(r.venue == venue_id, r.number >= number).order_by(r.number).limit(1)
     at: datetime = connection.execute(query).scalar_one()
     return at
@@ -148,10 +140,7 @@ def revisions_of(connection: sa.Connection, venue_id: str, before: int | None, l
 
 
 def documents_as_of_revisions(connection: sa.Connection, venue_id: str, document: Any) -> Iterator[Document]:
-    """Yield the document of a venue with the poses, lenses and ridge of its revisions, the newest first.
-
-    Revisions that do not go with it are passed over.
-    """
+    """Yield the document of a venue with poses, lenses and ridge of each revision that fits it, newest first."""
     query = sa.select(r.cameras, r.ridge).where(r.venue == venue_id).order_by(r.number.desc()).limit(MOST_SALVAGED)
     for row in connection.execute(query):
         with suppress(*MISSHAPEN):
@@ -163,9 +152,9 @@ def documents_as_of_revisions(connection: sa.Connection, venue_id: str, document
 
 
 def origin_of(connection: sa.Connection, venue_id: str, revision: Revision) -> Revision:
-    """Return the revision that was put back, through any number of restorations; any other revision is its own origin.
+    """Return the revision that a restored one goes back to, through any number of restorations.
 
-    Of one that has expired its last restoration stands for it.
+    Any other revision is its own origin. The oldest restoration that is kept stands for an origin that has expired.
     """
     while revision.restored_from is not None:
         restored = revisions_of(connection, venue_id, revision.restored_from + 1, 1).revisions
@@ -176,14 +165,14 @@ def origin_of(connection: sa.Connection, venue_id: str, revision: Revision) -> R
 
 
 def revision_of_job(connection: sa.Connection, job_id: str) -> int | None:
-    """The number of the revision that a job's poses became last."""
+    """Return the number of the last revision with the poses of a job, None if there is none."""
     query = sa.select(sa.func.max(r.number)).where(r.job == job_id, r.cause.in_(CALIBRATION_CAUSES))
     number: int | None = connection.scalar(query)
     return number
 
 
 def revisions_of_jobs(connection: sa.Connection, job_ids: Collection[str]) -> dict[str, int]:
-    """The numbers of the revisions that the poses of jobs became last, of those whose poses did."""
+    """Return by job the number of the last revision with its poses, without jobs that have none."""
     if not job_ids:
         return {}
     newest = sa.func.max(r.number).label("newest")
@@ -192,7 +181,7 @@ def revisions_of_jobs(connection: sa.Connection, job_ids: Collection[str]) -> di
 
 
 def revision_before(connection: sa.Connection, venue_id: str, job_id: str) -> int:
-    """The number of the last revision that is not a job's, or that gave its poses back."""
+    """Return the number of the last revision that does not have the poses of a job."""
     of_job = sa.and_(sa.func.coalesce(r.job, "") == job_id, r.cause.in_(CALIBRATION_CAUSES))
     number: int = connection.execute(
         sa.select(sa.func.max(r.number)).where(r.venue == venue_id, sa.not_(of_job))
@@ -201,15 +190,18 @@ def revision_before(connection: sa.Connection, venue_id: str, job_id: str) -> in
 
 
 def state_at(connection: sa.Connection, venue: Venue, number: int) -> tuple[Venue, Revision]:
-    """A venue as it was at a revision, and that revision. Raises where there is none or it does not fit any more."""
+    """Return a venue as it was at a revision, and that revision.
+
+    Raises the problems `revision-not-found` and `revision-unfit`.
+    """
     row = connection.execute(sa.select(tables.revisions).where(r.venue == venue.id, r.number == number)).one_or_none()
     if row is None:
-        raise NoSuchRevision
+        raise Problem("revision-not-found", f"GET /venues/{venue.id}/history lists those there are.")
     return _state_of(venue, row, _changes_of_numbers(connection, venue.id)), _revision(row)
 
 
 def revisions_that_fit(connection: sa.Connection, venue: Venue, numbers: Collection[int]) -> set[int]:
-    """Those of a venue's revisions that it can be put back to."""
+    """Return those of some revisions of a venue that it can be restored to."""
     rows = connection.execute(sa.select(tables.revisions).where(r.venue == venue.id, r.number.in_(numbers)))
     changes = _changes_of_numbers(connection, venue.id)
     return {row.number for row in rows if _fits(venue, row, changes)}
@@ -218,7 +210,7 @@ def revisions_that_fit(connection: sa.Connection, venue: Venue, numbers: Collect
 def _fits(venue: Venue, row: Any, changes: Changes) -> bool:
     try:
         _state_of(venue, row, changes)
-    except (RevisionUnfit, UnreadableRow):
+    except (Problem, UnreadableRow):
         return False
     return True
 
@@ -227,29 +219,33 @@ def _state_of(venue: Venue, row: Any, changes: Changes) -> Venue:
     cameras = list(_cameras(row).values())
     then, now = ({camera.id: camera.image_size for camera in some} for some in (cameras, venue.cameras))
     if then != now:
-        raise RevisionUnfit(f"It has the cameras {_in_words(then)}, and the venue now has {_in_words(now)}.")
+        raise _unfit(f"It has the cameras {_in_words(then)}, and the venue now has {_in_words(now)}.")
     try:
         return _with_state(venue, cameras, row.ridge, _numbers_at(venue.field, row.number, changes))
     except ValueError:
-        raise RevisionUnfit("Its ridge is none of the pitch that the venue now has.") from None
+        raise _unfit("Its ridge is none of the pitch that the venue now has.") from None
+
+
+def _unfit(why: str) -> Problem:
+    return Problem("revision-unfit", f"{why} PUT the venue with the poses that you want.")
 
 
 def _number_changes(before: FieldOfPlay, after: FieldOfPlay) -> dict[str, dict[str, float]]:
-    """The numbers of a field that differ from those before, as `schemas.history.NumberChange` by name."""
+    """Return the numbers of a field that differ from those before, as `schemas.history.NumberChange` by name."""
     numbers = {name: {"before": before.number(name), "after": after.number(name)} for name in FIELD_NUMBERS}
     return {name: number for name, number in numbers.items() if number["before"] != number["after"]}
 
 
 def _changes_of_numbers(connection: sa.Connection, venue_id: str) -> Changes:
-    """The changes of numbers of the field that came with revisions, each with its revision, oldest first."""
+    """Return the changes of the field's numbers by revisions of a venue, oldest first."""
     query = sa.select(r.number, r.field_numbers).where(r.venue == venue_id, r.field_numbers.is_not(None))
     return [(row.number, row.field_numbers) for row in connection.execute(query.order_by(r.number))]
 
 
 def _numbers_at(field: FieldOfPlay, revision: int, changes: Changes) -> dict[str, float]:
-    """What length and width were at a revision, of those that revisions have changed since.
+    """Return length and width of the field at a revision, if later revisions have changed them.
 
-    One that somebody has put since is as that person says, at any time. The ridge is kept with every revision.
+    A number that a person has put since stays as it was put. The ridge is kept with every revision.
     """
     numbers: dict[str, float] = {}
     for name in NUMBERS_BESIDE_RIDGE:
@@ -262,9 +258,9 @@ def _numbers_at(field: FieldOfPlay, revision: int, changes: Changes) -> dict[str
 def _with_state(
     venue: Venue, cameras: list[PosedCamera], ridge: list[list[float]] | None, numbers: dict[str, float]
 ) -> Venue:
-    """The same venue with the poses and lenses of another time, and the ridge and numbers that they belong to."""
+    """Return a venue with the poses and lenses of another time, and with the ridge and numbers that belong to them."""
     then = {camera.id: camera for camera in cameras}
-    back = [
+    restored = [
         camera.model_copy(
             update={
                 "pose": then[camera.id].pose,
@@ -274,7 +270,7 @@ def _with_state(
         for camera in venue.cameras
     ]
     field = FieldOfPlay.model_validate(venue.field.model_dump() | numbers | {"ridge": ridge})
-    return venue.model_copy(update={"cameras": back, "field": field})
+    return venue.model_copy(update={"cameras": restored, "field": field})
 
 
 def _movements(
@@ -302,7 +298,7 @@ def _movements(
 
 
 def _changed(venue: Venue, before: dict[str, PosedCamera]) -> list[str]:
-    """The cameras that stand or image otherwise than they did."""
+    """Return the cameras whose pose or lens has changed."""
     return [
         camera.id
         for camera in venue.cameras
@@ -339,7 +335,7 @@ def _cameras_at(connection: sa.Connection, venue_id: str, number: int) -> dict[s
 
 
 def _cameras_or_none(row: Any) -> dict[str, PosedCamera]:
-    """Return how the cameras stood at a revision, {} where there is none or it cannot be read: what comes goes on."""
+    """Return the cameras of a revision; empty without one, or if it cannot be read, so that changes go on."""
     try:
         return {} if row is None else _cameras(row)
     except UnreadableRow:

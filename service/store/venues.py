@@ -1,11 +1,13 @@
-"""Venues, and the way back to how they were: all SQL about them."""
+"""Venues, their changes and their restoration: all SQL about them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from datetime import datetime, timedelta
+from itertools import count
+from types import MappingProxyType
 from typing import Any, Literal
 
 import sqlalchemy as sa
@@ -18,10 +20,13 @@ from service.schemas.findings import describe_errors
 from service.schemas.health import VenueHealth
 from service.schemas.history import Cause, Revision
 from service.schemas.names import OPEN_STATUSES
+from service.schemas.problems import Problem
 from service.schemas.results import Result
+from service.schemas.source_urls import SourceSecrets
 from service.schemas.venue import Venue, VenueIn
 from service.store import live_alarms, tables
 from service.store.alarms import health_of, update_alarms
+from service.store.credentials import merge_credentials, read_credentials, write_credentials
 from service.store.database import Repository, advisory_lock, clock, reading, writing
 from service.store.documents import Document, stored_venue, to_document, with_unknown_fields_of
 from service.store.events.event_log import add_venue_event
@@ -34,6 +39,8 @@ from service.store.memories import (
     revisions_with_memories,
     without_those_that_changed,
 )
+from service.store.preconditions import UNCONDITIONAL, Precondition
+from service.store.refusals import no_such_venue, venue_busy
 from service.store.revisions import (
     RevisionPage,
     add_revision,
@@ -50,7 +57,7 @@ from service.store.trends import forget_trends, note_night
 from service.store.unreadable import MOST_FAULTS, UnreadableRow, read_each, reading_row
 
 v = tables.venues.c
-# What goes with a venue.
+# Tables whose rows are deleted with their venue.
 OF_VENUES = (
     tables.revisions,
     tables.memories,
@@ -65,13 +72,13 @@ OF_VENUES = (
 )
 
 
-# An unreadable venue cannot be repaired by the service; this often a duty looks whether somebody has.
+# Interval in which a duty looks whether somebody has repaired an unreadable venue.
 UNREADABLE_RETRY = timedelta(minutes=10)
 
 
 @dataclass(frozen=True)
 class StoredVenue:
-    """A venue, and its document as it was read, with what other versions have written into it.
+    """A venue and its stored document, with fields that other versions have written into it.
 
     `unreadable`: why the document cannot be read; then `venue` is what could be salvaged of it, see `find_replaceable`.
     """
@@ -83,7 +90,7 @@ class StoredVenue:
 
 @dataclass(frozen=True)
 class VenuePage:
-    """Venues of a page by id, those of it that cannot be read, and the id after which the next page begins."""
+    """Page of venues by id, those that cannot be read, and the id after which the next page begins."""
 
     venues: list[Venue]
     unreadable: list[Unreadable]
@@ -91,17 +98,14 @@ class VenuePage:
 
 
 Find = Callable[[sa.Connection, str], StoredVenue | None]
-
-
-class VenueRefused(Exception):  # noqa: N818
-    """A venue was not written because a client could not send it as it would be; the message says why."""
+NO_SECRETS: Mapping[str, SourceSecrets] = MappingProxyType({})
 
 
 class VenueRepository(Repository):
     """The venues in the database."""
 
     def get(self, venue_id: str) -> Venue | None:
-        """One venue."""
+        """Return a venue, None if there is none. Raises `UnreadableRow`."""
         with reading(self._engine) as connection:
             return find_venue(connection, venue_id)
 
@@ -113,10 +117,10 @@ class VenueRepository(Repository):
         q: str | None = None,
         state: Literal["ok", "alarm"] | None = None,
     ) -> VenuePage:
-        """Return up to `limit` venues by id, those after `after`; of `only` these, None: of all.
+        """Return up to `limit` venues by id, those after the id `after`, and among `only` these, None: among all.
 
-        `q`: those whose id or name contains it; large letters are small ones (on SQLite those of ASCII). `state`: those
-        of which an alarm rings, or none does.
+        `q`: only those whose id or name contains it, ignoring case (on SQLite that of ASCII). `state`: only those with
+        an active alarm, or without.
         """
         query = sa.select(v.id, v.document).order_by(v.id).limit(limit + 1)
         if after is not None:
@@ -137,74 +141,63 @@ class VenueRepository(Repository):
     def put(
         self,
         venue: Venue,
-        allow: Callable[[Venue | None], None],
-        credentials: Callable[[Venue | None, dict[str, str]], dict[str, str]] = lambda _, __: {},
+        secrets: Mapping[str, SourceSecrets] = NO_SECRETS,
+        precondition: Precondition = UNCONDITIONAL,
         by: Actor | None = None,
-    ) -> bool:
-        """Store a venue unless `allow` raises at the sight of what is there; says whether it is new.
-
-        `credentials`: those of its sources, by what is there and those that are stored; it may raise too.
-        """
-
-        def put(before: Venue | None, known: dict[str, str]) -> tuple[Venue, dict[str, str]]:
-            allow(before)
-            return venue, credentials(before, known)
-
-        return self.change(venue.id, put, by, find_replaceable)[1]
-
-    def change(
-        self,
-        venue_id: str,
-        change: Callable[[Venue | None, dict[str, str]], tuple[Venue, dict[str, str]]],
-        by: Actor | None = None,
-        find: Find | None = None,
     ) -> tuple[Venue, bool]:
-        """Store what `change` makes of a venue and of the credentials of its sources, unless it raises at the sight.
+        """Create or replace a venue, readable or not; return it as stored, and True if it is new.
 
-        `find`: `find_replaceable` of a change that leaves nothing of what was; else what cannot be read stays as it is.
-        Gives the venue, and says whether it is new.
+        `secrets`: those of its sources as they were sent, by camera. What came hidden stays as it was stored.
         """
         with writing(self._engine) as connection:
-            advisory_lock(connection, venue_lock(venue_id))
-            stored = (find or find_stored)(connection, venue_id)
-            before = None if stored is None else stored.venue
-            venue, credentials = change(before, _credentials(connection, venue_id))
-            _keep(connection, venue_id, credentials)
-            store_venue(connection, stored, venue, "put", by)
-            return venue, before is None
+            advisory_lock(connection, venue_lock(venue.id))
+            stored = find_replaceable(connection, venue.id)
+            precondition.check(None if stored is None else stored.venue)
+            return _put(connection, stored, venue, secrets, by), stored is None
+
+    def patch(
+        self,
+        venue_id: str,
+        patch: Callable[[Venue], tuple[Venue, Mapping[str, SourceSecrets]]],
+        precondition: Precondition = UNCONDITIONAL,
+        by: Actor | None = None,
+    ) -> Venue:
+        """Replace a venue by what `patch` makes of it, and of the secrets of its sources; return it as stored."""
+        with changing_venue(self._engine, venue_id, precondition) as (connection, stored):
+            return _put(connection, stored, *patch(stored.venue), by)
 
     def restore(
-        self, venue_id: str, number: int, allow: Callable[[Venue | None], None], by: Actor | None = None
+        self, venue_id: str, number: int, precondition: Precondition = UNCONDITIONAL, by: Actor | None = None
     ) -> tuple[Venue, list[str]]:
-        """Let a revision hold again unless `allow` raises at the sight of the venue, which need not be readable.
+        """Restore the poses of a revision of a venue, which need not be readable.
 
-        Gives the venue, and the cameras whose memories are dropped because none are kept with that revision. Raises
-        `NoSuchRevision` and `RevisionUnfit`. Nothing is written if it holds anyway.
+        Returns the venue, and the cameras whose memories are dropped because none are kept with that revision. Raises
+        the problems `revision-not-found` and `revision-unfit`. Writes nothing if the venue has these poses already.
         """
-        with changing_venue(self._engine, venue_id, allow, find_replaceable) as (connection, before):
+        with changing_venue(self._engine, venue_id, precondition, find_replaceable) as (connection, before):
             with update_quality(connection, venue_id) as quality:
                 restored, forgetful = restore_state(connection, quality, before, number, by)
                 update_alarms(connection, quality, restored)
             return restored, forgetful
 
     def with_memories(self, venue_id: str) -> set[int]:
-        """Return the revisions of a venue that `restore` brings back with the nights that cameras remembered."""
+        """Return the revisions of a venue whose memories are kept, so that `restore` brings them back."""
         with reading(self._engine) as connection:
             return revisions_with_memories(connection, venue_id)
 
     def restorable(self, venue: Venue, numbers: Collection[int]) -> set[int]:
-        """Return the revisions of a venue that `restore` would not refuse: of these cameras and this pitch."""
+        """Return those revisions of a venue that `restore` would not refuse: with the same cameras and pitch."""
         with reading(self._engine) as connection:
             return revisions_that_fit(connection, venue, numbers)
 
     def repairing(self, venue_id: str, numbers: Collection[int]) -> set[int]:
-        """Return the revisions of these by which `restore` makes a venue that cannot be read readable again."""
+        """Return those revisions of an unreadable venue by which `restore` makes it readable again."""
         with reading(self._engine) as connection:
             stored = find_replaceable(connection, venue_id)
             return set() if stored is None else revisions_that_fit(connection, stored.venue, numbers)
 
     def update_alarms(self, venue_id: str) -> None:
-        """Begin and end the alarms of a venue that go by the time."""
+        """Begin and end the alarms of a venue that depend on the time."""
         with writing(self._engine) as connection:
             advisory_lock(connection, venue_lock(venue_id))
             venue = find_venue(connection, venue_id)
@@ -214,7 +207,7 @@ class VenueRepository(Repository):
                     live_alarms.plan_next(connection, venue_id, quality.now)
 
     def postpone_alarms(self, venue_id: str) -> None:
-        """Look at the alarms of a venue that cannot be read again after a while."""
+        """Postpone the alarms of a venue that cannot be read by `UNREADABLE_RETRY`."""
         with writing(self._engine) as connection:
             later = {"alarm_due_at": clock(connection) + UNREADABLE_RETRY}
             for table in (tables.venue_quality, tables.live_reports):
@@ -222,7 +215,7 @@ class VenueRepository(Repository):
                 connection.execute(sa.update(table).where(*is_due).values(**later))
 
     def with_alarms_due(self, limit: int) -> list[str]:
-        """Up to `limit` venues of which a time has passed that an alarm goes by."""
+        """Return up to `limit` venues whose alarms are due to be updated."""
         due_at = tables.venue_quality.c.alarm_due_at
         with reading(self._engine) as connection:
             now = clock(connection)
@@ -231,41 +224,50 @@ class VenueRepository(Repository):
             return list(dict.fromkeys(due))[:limit]
 
     def health(self, venue_id: str) -> VenueHealth | None:
-        """How a venue is doing."""
+        """Return the health of a venue, None if there is none."""
         with reading(self._engine) as connection:
             return health_of(connection, venue_id)
 
-    def delete(self, venue_id: str, allow: Callable[[Venue | None, str | None], None], by: Actor | None = None) -> None:
-        """Forget a venue and its poses unless `allow` raises at the sight of it or of its active job."""
-        with writing(self._engine) as connection:
-            advisory_lock(connection, venue_lock(venue_id))
+    def delete(self, venue_id: str, precondition: Precondition = UNCONDITIONAL, by: Actor | None = None) -> None:
+        """Delete a venue, readable or not, with its history; raises the problem `venue-busy` if a job of it is open."""
+        with changing_venue(self._engine, venue_id, find=find_replaceable) as (connection, stored):
             j = tables.jobs.c
             active = connection.scalar(sa.select(j.id).where(j.venue == venue_id, j.status.in_(OPEN_STATUSES)))
-            stored = find_replaceable(connection, venue_id)
-            allow(None if stored is None else stored.venue, active)
-            if stored is not None:
-                add_venue_event(connection, stored.venue, "venue.deleted", [], by)
+            if active is not None:
+                raise venue_busy(active)
+            precondition.check(stored.venue)
+            add_venue_event(connection, stored.venue, "venue.deleted", [], by)
             for table in OF_VENUES:
                 connection.execute(sa.delete(table).where(table.c.venue == venue_id))
-            connection.execute(sa.delete(tables.venues).where(tables.venues.c.id == venue_id))
+            connection.execute(sa.delete(tables.venues).where(v.id == venue_id))
 
     def with_credentials(self, venue_id: str) -> tuple[Venue, dict[str, str]] | None:
-        """A venue, and by camera user and password of the sources that have some: of one moment, or a password could
-        go to the host that a source was on before.
+        """Return a venue with the encoded secrets of its sources by camera; None without such a venue.
+
+        Both are read in one transaction, or a password could go to the host that a source was on before.
         """
         with reading(self._engine) as connection:
             stored = find_stored(connection, venue_id)
-            return None if stored is None else (stored.venue, _credentials(connection, venue_id))
+            return None if stored is None else (stored.venue, read_credentials(connection, venue_id))
 
     def readable(self, venue_id: str) -> Venue | None:
-        """Return one venue; None: there is none, or it cannot be read."""
+        """Return a venue, None if there is none or it cannot be read."""
         with reading(self._engine) as connection:
             return find_readable(connection, venue_id)
 
     def exists(self, venue_id: str) -> bool:
-        """Return whether there is a venue of this id, readable or not."""
+        """Return True if there is a venue of this id, readable or not."""
         with reading(self._engine) as connection:
             return connection.scalar(sa.select(v.id).where(v.id == venue_id)) is not None
+
+    def free_id(self) -> str:
+        """Return an id `venue-N` that no venue has and no job is about."""
+        prefix, j = "venue-", tables.jobs.c
+        venues = sa.select(v.id).where(v.id.startswith(prefix))
+        jobs = sa.select(j.venue).where(j.venue.startswith(prefix))
+        with reading(self._engine) as connection:
+            taken = set(connection.scalars(sa.union(venues, jobs)))
+        return next(name for name in (f"{prefix}{number}" for number in count(1)) if name not in taken)
 
     def history(self, venue_id: str, before: int | None, limit: int) -> list[Revision]:
         """Return up to `limit` revisions of a venue that can be read, newest first, those before number `before`."""
@@ -284,16 +286,16 @@ class VenueRepository(Repository):
 
 
 def find_stored(connection: sa.Connection, venue_id: str) -> StoredVenue | None:
-    """Return one venue, for a transaction that may change it. Raises `UnreadableRow`."""
+    """Return a stored venue for a transaction that may change it. Raises `UnreadableRow`."""
     row = _row_of(connection, venue_id)
     return None if row is None else StoredVenue(_venue_in(row), row.document)
 
 
 def find_replaceable(connection: sa.Connection, venue_id: str) -> StoredVenue | None:
-    """Return one venue, for a transaction that replaces or deletes it: one that cannot be read as well.
+    """Return a stored venue for a transaction that replaces or deletes it, even if it cannot be read.
 
-    Of such a venue what can be read with the poses, lenses and ridge of a revision is salvaged, of the newest possible.
-    It says who is told of changes, and where the passwords of its sources belong. Else it is a venue of its id alone.
+    An unreadable venue is salvaged with the poses, lenses and ridge of the newest revision that makes it readable: its
+    webhooks are told of the change, and the hosts of its sources keep their passwords. Otherwise it has only its id.
     """
     row = _row_of(connection, venue_id)
     if row is None:
@@ -309,7 +311,7 @@ def find_replaceable(connection: sa.Connection, venue_id: str) -> StoredVenue | 
 
 
 def find_readable(connection: sa.Connection, venue_id: str) -> Venue | None:
-    """Return one venue; None: there is none, or it cannot be read, which must not stop what can do without it."""
+    """Return a venue for a transaction that can do without it; None if there is none or it cannot be read."""
     try:
         return find_venue(connection, venue_id)
     except UnreadableRow:
@@ -327,36 +329,37 @@ def _venue_in(row: Any) -> Venue:
 
 @contextmanager
 def changing_venue(
-    engine: sa.Engine, venue_id: str, allow: Callable[[Venue | None], None], find: Find = find_stored
+    engine: sa.Engine, venue_id: str, precondition: Precondition = UNCONDITIONAL, find: Find = find_stored
 ) -> Iterator[tuple[sa.Connection, StoredVenue]]:
-    """A transaction that alone may change a venue, and what is stored of it, unless `allow` raises at the sight.
+    """Yield a transaction that alone may change a venue, and the stored venue.
 
-    `allow` raises where it is given None: there is no such venue.
+    Raises the problem `venue-not-found`, and `venue-changed` unless the venue meets the `precondition`.
     """
     with writing(engine) as connection:
         advisory_lock(connection, venue_lock(venue_id))
         stored = find(connection, venue_id)
-        allow(None if stored is None else stored.venue)
-        assert stored is not None
+        if stored is None:
+            raise no_such_venue(venue_id)
+        precondition.check(stored.venue)
         yield connection, stored
 
 
 def venue_lock(venue_id: str) -> str:
-    """What to be serialised about by whoever changes a venue, or relies on it to stay."""
+    """Return the name of the advisory lock for transactions that change a venue or rely on it."""
     return f"venue {venue_id}"
 
 
 def find_venue(connection: sa.Connection, venue_id: str) -> Venue | None:
-    """One venue, inside the caller's transaction."""
+    """Return a venue inside the caller's transaction, None if there is none. Raises `UnreadableRow`."""
     stored = find_stored(connection, venue_id)
     return None if stored is None else stored.venue
 
 
 def faults_of(venue: Venue) -> list[str]:
-    """Return in words what of a venue a client could not send: what is stored can be sent back as it is."""
+    """Return in words why a client could not send a venue: a stored one must be fit to be sent back as it is."""
     document = venue.model_dump(mode="json")
     try:
-        # Words of newer versions are none.
+        # Words of newer versions are no faults.
         VenueIn.model_validate(document, **TOLERANTLY)
     except ValidationError as error:
         return describe_errors(error.errors(), None, document)
@@ -364,23 +367,42 @@ def faults_of(venue: Venue) -> list[str]:
 
 
 def save_venue(connection: sa.Connection, venue: Venue, now: datetime, before: StoredVenue | None) -> None:
-    """Create or replace a venue, inside the caller's serialised transaction; `before`: what is stored of it so far.
+    """Create or replace the row of a venue, inside the caller's serialised transaction; `before`: as it is stored.
 
-    Raises `VenueRefused` for one that a client could not send: whoever reads it, or sends it back, would be refused.
+    Raises the problem `poses-refused` for a venue that a client could not send, as its reader could not send it back.
     """
     faults = faults_of(venue)
     if faults and before is not None:
-        # What another release has let pass does not keep this one from changing the rest.
-        known = faults_of(before.venue)
-        faults = [fault for fault in faults if fault not in known]
+        # Faults that another release has let pass do not keep this one from changing the rest.
+        old_faults = faults_of(before.venue)
+        faults = [fault for fault in faults if fault not in old_faults]
     if faults:
-        raise VenueRefused("; ".join(faults[:MOST_FAULTS]))
+        why = "; ".join(faults[:MOST_FAULTS])
+        raise Problem(
+            "poses-refused", f"{why}. Nothing was changed. Calibrate again; if it is the ridge, without fit_ridge."
+        )
     document = to_document(venue)
     if before is None:
         connection.execute(sa.insert(tables.venues).values(id=venue.id, document=document, updated_at=now))
     else:
         whole = with_unknown_fields_of(before.document, document)
         connection.execute(sa.update(tables.venues).where(v.id == venue.id).values(document=whole, updated_at=now))
+
+
+def _put(
+    connection: sa.Connection,
+    stored: StoredVenue | None,
+    venue: Venue,
+    secrets: Mapping[str, SourceSecrets],
+    by: Actor | None,
+) -> Venue:
+    """Create or replace a venue as a client sent it; return it with the callbacks that came hidden."""
+    before = None if stored is None else stored.venue
+    known = read_credentials(connection, venue.id)
+    venue = venue.with_callbacks_of(before)
+    write_credentials(connection, venue.id, merge_credentials(venue, secrets, before, known))
+    store_venue(connection, stored, venue, "put", by)
+    return venue
 
 
 def store_venue(
@@ -391,9 +413,9 @@ def store_venue(
     by: Actor | None,
     job_id: str | None = None,
 ) -> None:
-    """Create or replace a venue as somebody wants it, inside the caller's serialised transaction.
+    """Create or replace a venue with its events, schedule and alarms, inside the caller's serialised transaction.
 
-    `stored`: what is there; `cause` and `job_id`: of the revision, where that changes a pose or a lens.
+    `stored`: the venue so far; `cause` and `job_id`: those of the revision, if a pose or a lens changes.
     """
     before = None if stored is None else stored.venue
     save_venue(connection, venue, clock(connection), stored)
@@ -402,12 +424,12 @@ def store_venue(
     elif changed := venue.changed_parts(before):
         add_venue_event(connection, venue, "venue.changed", changed, by)
     with update_quality(connection, venue.id) as quality:
-        _note_placed(connection, quality, stored, venue, cause, job_id, by)
+        _add_revision_if_moved(connection, quality, stored, venue, cause, job_id, by)
         update_alarms(connection, quality, venue)
     plan_schedule(connection, venue)
 
 
-def _note_placed(
+def _add_revision_if_moved(
     connection: sa.Connection,
     quality: VenueQuality,
     stored: StoredVenue | None,
@@ -416,7 +438,7 @@ def _note_placed(
     job_id: str | None,
     by: Actor | None,
 ) -> None:
-    """Write down the revision that a venue may have become, with the memories that it leaves.
+    """Add the revision that a change of a venue makes, if it makes one, with the memories that stay.
 
     A camera that was put elsewhere, or has another lens, begins anew, and on another field all of them do.
     """
@@ -424,10 +446,13 @@ def _note_placed(
     if before is not None and before.field != venue.field:
         forget_memories(connection, venue.id)
         forget_trends(connection, venue.id)
-    if stored is None or before is None or stored.unreadable or not venue.has_same_poses_as(before):
+    is_adopted = cause == "adopted"
+    if stored is None or before is None or stored.unreadable or is_adopted or not venue.has_same_poses_as(before):
         memories = newest_memories(connection, venue.id)
-        left = {} if before is None else without_those_that_changed(memories, before, venue)
-        keep_memories(connection, venue.id, add_revision(connection, quality, venue, cause, job_id, by=by), left)
+        kept = {} if before is None else without_those_that_changed(memories, before, venue)
+        field_before = before.field if before is not None and is_adopted else None
+        number = add_revision(connection, quality, venue, cause, job_id, by=by, field_before=field_before)
+        keep_memories(connection, venue.id, number, kept)
 
 
 def apply_result(
@@ -441,9 +466,9 @@ def apply_result(
     memories: Memories,
     by: Actor | None,
 ) -> None:
-    """Let some cameras of a venue be as a calibration found them, inside the caller's serialised transaction.
+    """Store some cameras of a venue as a calibration found them, inside the caller's serialised transaction.
 
-    `memories`: those that the venue then has.
+    `memories`: those of the venue from then on.
     """
     found = with_result(stored.venue, result, cameras)
     save_venue(connection, found, quality.now, stored)
@@ -456,12 +481,12 @@ def apply_result(
 
 
 def with_result(venue: Venue, result: Result, cameras: Collection[str] | None = None) -> Venue:
-    """The same venue as a calibration found it: poses, the lenses and the ridge they belong to, and the cameras' light.
+    """Return a venue with the poses, lenses, light and ridge that a calibration found.
 
-    `cameras`: only those are as it found them; None: all.
+    `cameras`: only theirs; None: those of all.
     """
     found = {camera.id: camera for camera in result.cameras if cameras is None or camera.id in cameras}
-    standing = [
+    cameras_found = [
         camera.model_copy(
             update={
                 "pose": found[camera.id].pose,
@@ -474,7 +499,7 @@ def with_result(venue: Venue, result: Result, cameras: Collection[str] | None = 
         for camera in venue.cameras
     ]
     field = venue.field if result.ridge is None else venue.field.model_copy(update={"ridge": result.ridge})
-    return venue.model_copy(update={"cameras": standing, "field": field})
+    return venue.model_copy(update={"cameras": cameras_found, "field": field})
 
 
 def restore_state(
@@ -485,9 +510,9 @@ def restore_state(
     by: Actor | None,
     rejected_job: str | None = None,
 ) -> tuple[Venue, list[str]]:
-    """Let a revision of a venue hold again with its memories, inside the caller's serialised transaction.
+    """Restore a revision of a venue with its memories, inside the caller's serialised transaction.
 
-    Gives the venue, and the cameras that have a memory before and none after it.
+    Returns the venue, and the cameras that have a memory before and none after it.
     """
     before, forgetful = stored.venue, list[str]()
     then, revision = state_at(connection, before, number)
@@ -504,15 +529,3 @@ def restore_state(
         keep_memories(connection, then.id, restored, memories)
         quality.row.stitch_error_px = revision.stitch_error_px
     return then, forgetful
-
-
-def _credentials(connection: sa.Connection, venue_id: str) -> dict[str, str]:
-    rows = connection.execute(sa.select(tables.credentials).where(tables.credentials.c.venue == venue_id))
-    return {row.camera: row.userinfo for row in rows}
-
-
-def _keep(connection: sa.Connection, venue_id: str, credentials: dict[str, str]) -> None:
-    connection.execute(sa.delete(tables.credentials).where(tables.credentials.c.venue == venue_id))
-    rows = [{"venue": venue_id, "camera": camera, "userinfo": userinfo} for camera, userinfo in credentials.items()]
-    if rows:
-        connection.execute(sa.insert(tables.credentials), rows)

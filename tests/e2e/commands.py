@@ -14,7 +14,7 @@ from tests.e2e import warm
 
 
 def esc_here(folder: Path, *arguments: str, **environment: str) -> CompletedProcess:
-    """What a process of this command, in this folder and with this environment, would have said.
+    """Run a command in this process, and return what a process in this folder and environment would have printed.
 
     It spares each call the second in which a new interpreter imports everything. Not for what serves: that would go on
     holding its socket and its database.
@@ -39,7 +39,7 @@ def esc_here(folder: Path, *arguments: str, **environment: str) -> CompletedProc
 
 
 def esc_process(folder: Path, *arguments: str, **environment: str) -> CompletedProcess:
-    """The same in a process of its own, with this beside the environment of the tests."""
+    """Run the command in a process of its own, with this beside the environment of the tests."""
     command = [sys.executable, "-m", "service.cli", *arguments]
     with warm.Popen(command, cwd=folder, env=os.environ | environment, stdout=PIPE, stderr=PIPE, text=True) as process:
         try:

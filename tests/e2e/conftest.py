@@ -5,7 +5,6 @@ costs as much as thirty starts of a service.
 """
 
 import json
-import re
 import sys
 from contextlib import contextmanager
 from functools import partial
@@ -17,7 +16,7 @@ from tests import disks
 from tests.disks import may_mount
 from tests.e2e.commands import esc_here
 from tests.e2e.running import Service, png
-from tests.homes import Servers, environment
+from tests.homes import environment
 
 # Cameras of the tests are servers on this machine. One that sends without end is to be found out soon, one that a busy
 # machine delays is to be waited for.
@@ -54,12 +53,6 @@ def service_with_engine(tmp_path_factory):
 
 
 @pytest.fixture
-def service(request, home):
-    """The service that tests share; what they leave in it is theirs by its name."""
-    return request.getfixturevalue("service_on_servers" if isinstance(home, Servers) else "service_of_a_folder")
-
-
-@pytest.fixture
 def start(home, tmp_path):
     """Start services of one's own; all of them in one home unless told otherwise, whose tables are there."""
     with services_of_ones_own(home, tmp_path / "esc", home.make_database) as start:
@@ -68,7 +61,7 @@ def start(home, tmp_path):
 
 @contextmanager
 def services_of_ones_own(home, folder, prepare):
-    """What starts services in a home, which is prepared before each of them."""
+    """Yield a function that starts services in a home, which is prepared before each of them."""
     started = []
 
     def start(*arguments, **settings):
@@ -105,12 +98,6 @@ def small_disk(tmp_path):
         pytest.skip("a full disk needs a small one: run as root, where root may mount")
     with disks.small_disk(tmp_path / "disk", megabytes=16) as disk:
         yield disk
-
-
-@pytest.fixture
-def name(request):
-    """A venue id of the test's own."""
-    return re.sub("[^a-z0-9]+", "-", request.node.name.lower())[-60:].strip("-")
 
 
 @pytest.fixture

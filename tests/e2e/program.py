@@ -18,7 +18,7 @@ from service.schemas.rotation import rotate
 JPEG = b"\xff\xd8\xff\xd9"
 # Where cameras end, of the way from the middle of the pitch to where they were. Their translation shrinks alike.
 NEARER = 0.875
-# About which they have turned then, in venues of this name, rad about their first axis.
+# Rotation of cameras in venues of this name, rad about their first axis.
 TURNED = 0.05
 # From the anchor of each camera, as it is told after every job.
 DISPLACEMENT = {
@@ -45,14 +45,12 @@ def say(**message) -> None:
     print(json.dumps(message), flush=True)
 
 
-def fail(kind: str, detail: str, camera: str | None = None) -> None:
-    say(error={"type": f"/problems/{kind}", "title": "", "detail": detail, "camera": camera})
+def failed(kind: str, detail: str, camera: str | None = None) -> dict:
+    return {"error": {"type": f"/problems/{kind}", "title": "", "detail": detail, "camera": camera}}
 
 
-def done(result: dict, pictures: list[str], memories: dict | None = None) -> None:
-    say(result=result, pictures=dict.fromkeys(pictures, len(JPEG)), memories=memories or {})
-    sys.stdout.buffer.write(JPEG * len(pictures))
-    sys.stdout.flush()
+def done(result: dict, pictures: list[str], memories: dict | None = None) -> dict:
+    return {"result": result, "pictures": dict.fromkeys(pictures, len(JPEG)), "memories": memories or {}}
 
 
 def main() -> None:
@@ -84,17 +82,24 @@ def main() -> None:
             time.sleep(3600)
         case "chatter":
             print("this is not a message", flush=True)
-        case "fail":
-            fail("no-markings-in-view", "It is black.", "left")
-            return
+    last = answer(task, list(given["sizes"]))
+    say(**last)
+    sys.stdout.buffer.write(JPEG * len(last.get("pictures", ())))
+    sys.stdout.flush()
+
+
+def answer(task: dict, with_frames: list[str]) -> dict:
+    """The last message about a task, as the name of its venue says; its pictures are all alike."""
+    about = task["venue"] or task.get("site")
+    behaviour = about["name"].partition(" ")[0] if about else ""
+    if behaviour == "fail":
+        return failed("no-markings-in-view", "It is black.", "left")
     if task["kind"] == "find":
-        sought = sought_cameras(task, list(given["sizes"]))
+        sought = sought_cameras(task, with_frames)
         pictures = [f"candidate_{camera}_{number}" for camera in sought for number in (1, 2)]
-        done(found_cameras(sought, behaviour, task), pictures)
-        return
+        return done(found_cameras(sought, behaviour, task), pictures)
     if task["kind"] not in ("calibration", "field"):
-        fail("no-pose", "This program only moves cameras.")
-        return
+        return failed("no-pose", "This program only moves cameras.")
     cameras = task["venue"]["cameras"]
     memories = remembered(task, [camera["id"] for camera in cameras]) if behaviour == "refine" else {}
     pictures = ["preview", "birdseye", *(f"overlay_{camera['id']}" for camera in cameras)]
@@ -110,7 +115,7 @@ def main() -> None:
                 camera,
                 task.get("anchors", {}).get(camera["id"]),
                 accepted=number < good,
-                # Of another camera's frame no pose is sought.
+                # No pose is sought in another camera's frame.
                 nearer=1 if behaviour in ("swapped", "turn") else NEARER,
                 turned=TURNED if behaviour == "turn" else 0,
             )
@@ -131,20 +136,15 @@ def main() -> None:
         common["cameras"][0]["pose"] = pose_at([1.6, 0.1, -0.2], [5000.0, -50.0, 8.0])
     if task["kind"] == "field":
         field = task["venue"]["field"] | {"length_m": 104.25}
-        done(common | {"field": field, "measures": MEASURES}, pictures[2:])
-    else:
-        done(
-            common
-            | {
-                "verdict": "accepted" if everyone else "partly" if good else "rejected",
-                "stitch_error_before_px": 10.0,
-                "loss": 0.1,
-                "generations": 10,
-            }
-            | (contradicted(task["venue"]["field"]) if behaviour == "contradict" else {}),
-            pictures,
-            memories,
-        )
+        return done(common | {"field": field, "measures": MEASURES}, pictures[2:])
+    verdict = {
+        "verdict": "accepted" if everyone else "partly" if good else "rejected",
+        "stitch_error_before_px": 10.0,
+        "loss": 0.1,
+        "generations": 10,
+    }
+    more = contradicted(task["venue"]["field"]) if behaviour == "contradict" else {}
+    return done(common | verdict | more, pictures, memories)
 
 
 def sought_cameras(task: dict, with_frames: list[str]) -> list[str]:
@@ -198,7 +198,7 @@ def candidate(away_m: float) -> dict:
 
 
 def remembered(task: dict, cameras: list[str]) -> dict:
-    """What each camera remembers: how many jobs it was in, and when its frames of the last one were taken."""
+    """Memory of each camera: the number of its jobs, and when its frames of the last one were taken."""
     return {
         camera: {"jobs": task["memories"].get(camera, {"jobs": 0})["jobs"] + 1, "last": task["taken_at"]}
         for camera in cameras

@@ -29,7 +29,7 @@ IMPORTED = ("service.cli.main", "service.serving", "worker.supervisor", "service
 # What the interpreter reads as it starts.
 OF_THE_INTERPRETER = "PYTHON"
 LONGEST_REQUEST = 1 << 20
-# Of each `esc up`: the one that it keeps, and another for when that is killed.
+# Workers of each `esc up`: the one that it keeps, and another for when that is killed.
 SPARE_WORKERS = 2
 
 
@@ -48,7 +48,7 @@ class Popen(subprocess.Popen):
 
 
 def arguments_of(command, environment) -> list[str] | None:
-    """What `service.cli` is given by a command; None if the warm parent cannot stand in for its interpreter."""
+    """Arguments of `service.cli` in a command; None if the warm parent cannot stand in for its interpreter."""
     environment = os.environ if environment is None else environment
     if sys.platform != "linux" or isinstance(command, str):
         return None
@@ -64,7 +64,7 @@ def of_the_interpreter(environment) -> dict[str, str]:
 
 @functools.cache
 def warm_parent() -> "WarmParent":
-    """That of this process; it ends with it."""
+    """Warm parent of this process, which ends with it."""
     return WarmParent()
 
 
@@ -126,7 +126,7 @@ class SpareWorker:
 
 
 def spare_workers() -> list[SpareWorker]:
-    """Those of this process; none in each of them, which goes on from here as the worker that it is asked to be."""
+    """Start the spare workers of this process; each of them goes on from here as a worker, and gets an empty list."""
     spare: list[SpareWorker] = []
     while len(spare) < SPARE_WORKERS:
         spare.append(SpareWorker(spare))
@@ -136,7 +136,7 @@ def spare_workers() -> list[SpareWorker]:
 
 
 def kept_by(waiting: list[SpareWorker]) -> type[subprocess.Popen]:
-    """What `esc up` starts its worker with: the spare ones first, later ones as always."""
+    """Return the `Popen` by which `esc up` starts its worker: the spare ones first, later ones as always."""
 
     class Kept(subprocess.Popen):
         def _execute_child(self, args, *how):

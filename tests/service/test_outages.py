@@ -1,16 +1,14 @@
 """What the storage does is told apart from what a program does that is not there."""
 
-import asyncio
 import errno
 import os
 import shutil
 
-import httpx
 import pytest
 
-from service.app import create_app
 from service.settings import Settings
-from tests.e2e.running import png, venue
+from tests.e2e.running import png
+from tests.service.local_service import LocalService
 
 FRAMES = [(side, png()) for side in ("left", "right")]
 
@@ -20,14 +18,9 @@ def ask(tmp_path):
     """Ask a service with these settings that runs in this process, and has the venue v."""
 
     def ask(method, path, files=None, **settings):
-        async def answer():
-            app = create_app(Settings(data=tmp_path, **settings))
-            transport = httpx.ASGITransport(app, raise_app_exceptions=False)
-            async with httpx.AsyncClient(transport=transport, base_url="http://localhost") as client:
-                (await client.put("/venues/v", json=venue("v"))).raise_for_status()
-                return await client.request(method, path, files=files)
-
-        return asyncio.run(answer()).json()
+        with LocalService(Settings(data=tmp_path, **settings)) as service:
+            service.venue("v")
+            return service.http.request(method, path, files=files).json()
 
     return ask
 

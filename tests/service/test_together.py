@@ -13,6 +13,7 @@ from service.schemas.geometry import Moved, Pose
 from service.schemas.health import Alarms as Rules
 from service.schemas.job import JobError
 from service.schemas.options import Options
+from service.schemas.problems import Problem
 from service.schemas.results import CameraResult, Provenance, Result
 from service.schemas.venue import VenueIn
 from service.store.database import connect, migrate
@@ -20,12 +21,13 @@ from service.store.ids import new_id
 from service.store.jobs import attempts
 from service.store.jobs import submission as submissions
 from service.store.jobs.queries import JobPage
-from service.store.jobs.submission import KeyReused, QueueFull, Submission
+from service.store.jobs.submission import Submission
 from service.store.statistics import counters
 from service.store.workers import WorkerRepository
 from tests.e2e.running import venue
 from tests.homes import in_both_homes, on_servers
-from tests.worker.stock import anyway, result
+from tests.problems import refused
+from tests.worker.stock import result
 
 LIMIT = 3
 SHIFTED = [0.0, -55.0, 9.0]
@@ -99,14 +101,14 @@ def test_processes_that_start_together_make_the_schema_once(home, tmp_path):
 def test_the_queue_takes_no_more_than_its_limit_however_many_come_at_once(stock, queue):
     crowd = 8
     for number in range(crowd):
-        stock.venues.put(stored(f"v{number}"), lambda _: None)
+        stock.venues.put(stored(f"v{number}"))
     together = Barrier(crowd)
 
     def submit(number):
         together.wait()
         try:
             return stock.submissions.submit(submission(f"v{number}"), LIMIT, queue.enqueue)[1]
-        except QueueFull:
+        except Problem:
             return False
 
     with ThreadPoolExecutor(crowd) as pool:
@@ -118,7 +120,7 @@ def test_the_queue_takes_no_more_than_its_limit_however_many_come_at_once(stock,
 def test_other_content_under_a_key_whose_job_comes_meanwhile_is_told_that_and_not_that_the_venue_is_busy(
     stock, queue, monkeypatch
 ):
-    stock.venues.put(stored("v"), lambda _: None)
+    stock.venues.put(stored("v"))
     first, other = (submission("v", content).model_copy(update={"idempotency_key": "k"}) for content in ("c", "d"))
     look_up = submissions._of_key
 
@@ -129,9 +131,9 @@ def test_other_content_under_a_key_whose_job_comes_meanwhile_is_told_that_and_no
         return before
 
     monkeypatch.setattr(submissions, "_of_key", looked_up_just_before)
-    with pytest.raises(KeyReused) as refused:
+    with refused("idempotency-key-reused") as problem:
         stock.submissions.announce(other, LIMIT, timedelta(minutes=1))
-    assert refused.value.job_id == first.job_id
+    assert problem.value.parts["job"] == first.job_id
 
 
 @in_both_homes
@@ -200,7 +202,7 @@ def two_count_at_once(monkeypatch):
 def test_a_job_that_is_rejected_and_one_that_fails_do_not_wait_for_each_other(stock, monkeypatch):
     for name in ("v", "w"):
         rules = Rules(rejected_in_a_row=1)
-        stock.venues.put(stored(name).model_copy(update={"alarms": rules}), anyway)
+        stock.venues.put(stored(name).model_copy(update={"alarms": rules}))
     rejected, failed = (stock.attempts.begin(stock.submitted(name)) for name in ("v", "w"))
     # Both count an alarm and an end; each has counted one of them before either counts the other.
     two_count_at_once(monkeypatch)
@@ -226,7 +228,7 @@ def test_alarms_that_begin_in_another_order_at_another_venue_do_not_wait_for_eac
     two_count_at_once(monkeypatch)
     watched = [stock.venues.get(name).model_copy(update={"alarms": rules}) for name in ("v", "w")]
     with ThreadPoolExecutor(2) as both:
-        puts = [both.submit(stock.venues.put, venue, anyway) for venue in watched]
+        puts = [both.submit(stock.venues.put, venue) for venue in watched]
     assert [put.exception() for put in puts] == [None, None]
     ringing = {name: {(alarm.rule, alarm.camera) for alarm in stock.venues.health(name).alarms} for name in ("v", "w")}
     assert ringing == {

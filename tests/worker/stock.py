@@ -81,7 +81,7 @@ class Stock(Repositories):
         first, *others = venue.cameras
         pose = Pose.from_position(first.pose.rotation, [x, *first.pose.position[1:]])
         cameras = [first.model_copy(update={"pose": pose, **camera}), *others]
-        self.venues.put(venue.model_copy(update={"cameras": cameras}), anyway)
+        self.venues.put(venue.model_copy(update={"cameras": cameras}))
 
     def time_passes(self, **time: float) -> None:
         """All that alarms go by was so much earlier."""
@@ -119,18 +119,14 @@ class Stock(Repositories):
         stored = self.venues.get(venue_id)
         if stored is None:
             stored = VenueIn.model_validate(venue(venue_id)).to_venue()
-            self.venues.put(stored, anyway)
+            self.venues.put(stored)
         return stored
 
     def schedule(self, venue_id: str, schedule: Schedule | None) -> None:
         """Put a schedule on a venue, and on its cameras the sources that one needs."""
         stored = self.venue(venue_id)
         cameras = [one.model_copy(update={"source": f"http://10.0.0.7/{one.id}.jpg"}) for one in stored.cameras]
-        self.venues.put(stored.model_copy(update={"cameras": cameras, "schedule": schedule}), anyway)
-
-
-def anyway(_: object) -> None:
-    """Allow it."""
+        self.venues.put(stored.model_copy(update={"cameras": cameras, "schedule": schedule}))
 
 
 def result(of: Venue, accepted: bool | Collection[str]) -> Result:

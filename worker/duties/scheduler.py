@@ -20,11 +20,11 @@ from service.intake.snapshots import SourceLate
 from service.observability.disk import Disk
 from service.schemas.job import Job
 from service.schemas.options import Options
-from service.schemas.problems import Problem
+from service.schemas.problems import PROBLEM_TYPES, Problem
 from service.schemas.schedule import Schedule
 from service.schemas.venue import Venue
 from service.settings import Settings
-from service.store.jobs.submission import QueueFull, SubmissionRefused, SubmissionRepository, VenueBusy, VenueReplaced
+from service.store.jobs.submission import SubmissionRepository
 from service.store.jobs.task import SCHEDULE, Origin
 from service.store.schedules import Due, Firing, ScheduleRepository
 from service.store.unreadable import UnreadableRow
@@ -43,8 +43,10 @@ QUICK_S = 4.0
 # Longer than it takes to fetch frames and to store them.
 ATTEMPT = timedelta(minutes=10)
 DEFER = timedelta(seconds=30)
-# Refusals that end by themselves: jobs that wait or run, and files past their time.
-TRANSIENT = (QueueFull, VenueBusy, VenueReplaced)
+# Problems that end by themselves: jobs that wait or run, and other fetches.
+TRANSIENT = ("queue-full", "venue-busy", "venue-replaced", "unavailable")
+# Problems of the submission itself: the venue was deleted, or a person has used the key of the schedule.
+REFUSED = ("venue-not-found", "idempotency-key-reused")
 log = structlog.get_logger()
 
 
@@ -130,9 +132,9 @@ class Scheduler:
             except DeferredError as deferred:
                 self._schedules.postpone(firing, self._schedules.now() + DEFER, str(deferred))
                 log.warning("schedule put off", why=str(deferred))
-            except SubmissionRefused as refusal:
-                self._schedules.done(firing, self._schedules.now(), None, refusal.__doc__)
-                log.warning("schedule fired in vain", why=refusal.__doc__)
+            except Problem as refusal:
+                self._schedules.done(firing, self._schedules.now(), None, _in_words(refusal))
+                log.warning("schedule fired in vain", why=_in_words(refusal))
             else:
                 error = None if job.error is None else job.error.detail
                 self._schedules.done(firing, self._schedules.now(), job.id, error)
@@ -179,11 +181,11 @@ class Scheduler:
                 within_s=None if slow else QUICK_S,
                 fetched=fetched,
             )[0]
-        except TRANSIENT as refusal:
-            raise DeferredError(refusal.__doc__) from None
         except Problem as problem:
-            if problem.kind == "unavailable":
-                raise DeferredError(problem.detail) from None
+            if problem.kind in TRANSIENT:
+                raise DeferredError(_in_words(problem)) from None
+            if problem.kind in REFUSED:
+                raise
             if problem.kind == "source-failed":
                 self._schedules.not_fetched(firing)
             if isinstance(problem, SourceLate) and "source" in problem.parts:
@@ -191,6 +193,10 @@ class Scheduler:
             if isinstance(problem, SourceLate) and not slow and self._settings.source_timeout_s > QUICK_S:
                 raise TooSlowError from None
             return self._from_sources.fail(venue, options, name, origin, problem)
+
+
+def _in_words(problem: Problem) -> str:
+    return f"{PROBLEM_TYPES[problem.kind].title}. {problem.detail}"
 
 
 def _sources(venue: Venue) -> list[str]:

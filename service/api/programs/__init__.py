@@ -1,1 +1,1 @@
-"""Programs beside the API that are asked for something at once, without a job: what needs NumPy."""
+"""Programs that compute answers to requests at once, without a job, since the API has no NumPy."""

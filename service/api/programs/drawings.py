@@ -1,21 +1,19 @@
 """Pictures of calibrations, drawn when somebody first looks at them, and kept.
 
 A program draws them, beside this process: frames are what strangers sent, and decoding and blending them here would
-hold up every other request. A few at a time; who waits for a turn holds no thread. Several API processes may draw the
-same picture at once: it is the same, and stored under the same name.
+hold up every other request. Several API processes may draw the same picture at once: it is the same, and stored under
+the same name.
 """
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager, suppress
+from contextlib import suppress
 from weakref import WeakValueDictionary
 
 from starlette.concurrency import run_in_threadpool
 
-from service.api.programs.running import run_program
-from service.schemas.problems import Problem
+from service.api.programs.program_pool import ProgramPool, run_program, turn_of
 from service.schemas.programs.drawing import DrawingRequest, DrawnPictures, decode_files, encode_message
 from service.settings import Settings
 from service.store.blobs import Blobs, DamagedBlob
@@ -23,22 +21,19 @@ from service.store.jobs.files import drawn_together, picture_file, pictures_fold
 from service.store.jobs.queries import Drawable, JobRepository, Pictures
 
 LONGEST_S = 60.0
-# The first picture takes about a second, and a page asks for several at once.
-PATIENCE_S = 20.0
-AGAIN_S = 2
 
 
 class Drawings:
-    """Asks the program that draws them, for so many at once."""
+    """Draws pictures of jobs by a program, `ESC_PICTURES_AT_ONCE` of them at once."""
 
     def __init__(self, settings: Settings, jobs: JobRepository, blobs: Blobs) -> None:
         self._settings, self._jobs, self._blobs = settings, jobs, blobs
-        self._turns = asyncio.Semaphore(settings.pictures_at_once)
-        # Of pictures that are drawn together: whoever asks for one while they are drawn waits for them.
+        self._pool = ProgramPool("picture", LONGEST_S, at_once=settings.pictures_at_once)
+        # One for each set of pictures that are drawn together, so that nobody else draws it meanwhile.
         self._drawing: WeakValueDictionary[str, asyncio.Lock] = WeakValueDictionary()
 
     async def picture(self, job_id: str, pictures: Pictures, name: str) -> bytes | None:
-        """The file of a picture of a job, drawn if it is not there; None if it cannot be drawn any more."""
+        """Return the file of a picture of a job, drawn if it is not there; None if it cannot be drawn any more."""
         stored = await run_in_threadpool(self._stored, pictures, name)
         together = drawn_together(name)
         if stored is not None or not together:
@@ -48,7 +43,7 @@ class Drawings:
             stored = await run_in_threadpool(self._stored, pictures, name)
             if stored:
                 return stored
-            async with turn_of(self._turns):
+            async with self._pool.turn():
                 return await run_in_threadpool(self._draw, job_id, pictures, name)
 
     def _draw(self, job_id: str, pictures: Pictures, name: str) -> bytes | None:
@@ -59,27 +54,27 @@ class Drawings:
         files = {camera: frame for camera, frame in frames.items() if frame is not None}
         asked = DrawingRequest.of(job.venue, job.result, [name], self._settings.threads, files)
         program, environment = self._settings.picture_program, self._settings.native_environment
-        said = run_program("picture", program, environment, encode_message(asked, files), LONGEST_S)
-        drawn = decode_files(DrawnPictures.model_validate_json(said[: said.index(b"\n")]).sizes, said)
+        output = run_program("picture", program, environment, encode_message(asked, files), LONGEST_S)
+        drawn = decode_files(DrawnPictures.model_validate_json(output[: output.index(b"\n")]).sizes, output)
         for each, picture in drawn.items():
             self._blobs.put(f"{pictures.folder}/{picture_file(each)}", picture)
         self._forget_if_gone(job_id)
         return drawn.get(name)
 
     def _frames(self, job: Drawable, pictures: Pictures, name: str) -> dict[str, bytes | None]:
-        """Of the cameras that a picture shows; from their own folder, or what was kept of it."""
-        of_one = name.partition("_")[2]
-        needed = [of_one] if of_one in job.frames and f"frame_{of_one}" in drawn_together(name) else job.frames
-        return {camera: drawable_frame(self._blobs, job.frames[camera], pictures.folder, camera) for camera in needed}
+        """Return the frames of the cameras that a picture shows, None for those that are gone."""
+        camera = name.partition("_")[2]
+        needed = [camera] if camera in job.frames and f"frame_{camera}" in drawn_together(name) else job.frames
+        return {one: drawable_frame(self._blobs, job.frames[one], pictures.folder, one) for one in needed}
 
     def _forget_if_gone(self, job_id: str) -> None:
-        """Who tidied up while they were drawn does not come again."""
-        left = self._jobs.pictures(job_id)
-        if left is None or left.deleted:
+        """Delete pictures whose job was deleted while they were drawn: retention does not come again."""
+        pictures = self._jobs.pictures(job_id)
+        if pictures is None or pictures.deleted:
             self._blobs.delete_under(pictures_folder(job_id))
 
     def _stored(self, pictures: Pictures, name: str) -> bytes | None:
-        """The file of a picture; one that is damaged is as good as none, and may be drawn again."""
+        """Return the stored file of a picture; None if there is none, or it is damaged and may be drawn again."""
         with suppress(DamagedBlob):
             return self._blobs.read(f"{pictures.folder}/{picture_file(name)}")
         return None
@@ -95,20 +90,3 @@ def drawable_frame(blobs: Blobs, path: str, pictures_folder: str, camera: str) -
             if frame := blobs.read(place, stored_at=path):
                 return frame
     return None
-
-
-@asynccontextmanager
-async def turn_of(
-    turn: asyncio.Lock | asyncio.Semaphore, why: str = "Other pictures are being drawn."
-) -> AsyncIterator[None]:
-    """In one's turn, if it comes soon; who has waited long is told why, and to come again."""
-    try:
-        async with asyncio.timeout(PATIENCE_S):
-            await turn.acquire()
-    except TimeoutError:
-        headers = {"Retry-After": str(AGAIN_S)}
-        raise Problem("unavailable", why, headers=headers) from None
-    try:
-        yield
-    finally:
-        turn.release()

@@ -1,1 +1,1 @@
-"""What routes promise alike: whom they need, which problems they answer, entity tags, and files of poses."""
+"""Parts that routes share: required scopes, documented problems, entity tags, pages of lists, exported poses."""

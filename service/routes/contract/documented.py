@@ -1,4 +1,4 @@
-"""How problems, uploads and scopes appear in the OpenAPI document."""
+"""Problems, uploads and scopes in the OpenAPI document."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ HEADERS: dict[str, dict[str, Any]] = {
 }
 FILE: dict[str, Any] = {"type": "string", "format": "binary"}
 BINARY = {"schema": FILE}
-# Of a route that anybody may call.
+# `openapi_extra` of a route that anybody may call.
 FOR_ALL: dict[str, Any] = {"security": []}
 
 
@@ -45,7 +45,7 @@ class DocumentedApp(FastAPI):
     """FastAPI with these models among the schemas of its document, and sentences as summaries of its routes."""
 
     def openapi(self) -> dict[str, Any]:
-        """The OpenAPI document."""
+        """Return the OpenAPI document."""
         document = super().openapi()
         for model in MODELS:
             schema = model.model_json_schema(ref_template=f"{SCHEMAS}{{model}}")
@@ -58,13 +58,13 @@ class DocumentedApp(FastAPI):
 
 
 def _first_sentence(description: str) -> str:
-    """The first sentence of a route's description, which says more than the name of its function, as plain text."""
+    """Return the first sentence of a route's description as plain text: it says more than the function's name."""
     first = re.split(r"(?<=\.)\s", description, maxsplit=1)[0]
     return " ".join(first.removesuffix(".").replace("`", "").split())
 
 
 def document_callback(app: FastAPI) -> None:
-    """Add to the document what a `callback_url` gets."""
+    """Document the webhook that a `callback_url` of a job gets."""
 
     @app.webhooks.post("job-ended", status_code=204, tags=["jobs"])
     def job_ended(event: JobEvent) -> None:
@@ -76,7 +76,7 @@ def document_callback(app: FastAPI) -> None:
 
 
 def document_alarms(app: FastAPI) -> None:
-    """Add to the document what the `callback_url` of a venue's alarms gets."""
+    """Document the webhook that the `callback_url` of a venue's alarms gets."""
 
     @app.webhooks.post("alarm", status_code=204, tags=["venues"])
     def alarm(event: AlarmEvent) -> None:
@@ -84,7 +84,7 @@ def document_alarms(app: FastAPI) -> None:
 
 
 def document_events(app: FastAPI) -> None:
-    """Add to the document what the `webhooks` of a venue get."""
+    """Document the events that the `webhooks` of a venue get."""
 
     @app.webhooks.post("venue-event", status_code=204, tags=["venues"])
     def venue_event(event: Event) -> None:
@@ -95,7 +95,7 @@ def document_events(app: FastAPI) -> None:
 
 
 def schema_reference(model: type[BaseModel]) -> dict[str, str]:
-    """A schema that points to one of `MODELS`."""
+    """Return a schema that refers to one of `MODELS`."""
     return {"$ref": f"{SCHEMAS}{model.__name__}"}
 
 
@@ -108,7 +108,7 @@ def form_body(
     others: Mapping[str, Any] | bool = FILE,
     required: bool = True,
 ) -> dict[str, Any]:
-    """The body of a route that takes a form: `options`, `parts`, and of any other name what `others` says."""
+    """Return the body of a route that takes a form: `options`, further `parts`, and `others` of any other name."""
     schema = {
         "type": "object",
         "description": description,
@@ -122,7 +122,7 @@ def form_body(
 
 
 def frames_form_body(options: type[BaseModel], *, required: bool = True) -> dict[str, Any]:
-    """The body of a route that takes frames of all cameras of a venue; or not `required`, fetches them."""
+    """Return the body of a route that takes frames of all cameras of a venue; not `required` if it can fetch them."""
     # Its parts are no arrays: generators write code for a repeated part of any name that does not compile.
     return form_body(
         options,
@@ -133,7 +133,7 @@ def frames_form_body(options: type[BaseModel], *, required: bool = True) -> dict
 
 
 def submission_responses(known: str = "This content is already a job") -> dict[int | str, dict[str, Any]]:
-    """Entries for `responses=` of a route that makes a job; `known`: when there is no new one."""
+    """Return entries for `responses=` of a route that makes a job; `known`: description where there is no new one."""
     return {
         200: {"model": Job, "description": known, **header_docs("ETag")},
         202: header_docs("ETag", "Location", "Retry-After"),
@@ -141,16 +141,16 @@ def submission_responses(known: str = "This content is already a job") -> dict[i
 
 
 def needs_scope(scope: Scope) -> dict[str, Any]:
-    """Of a route that needs a key; OpenAPI 3.1 lets a requirement of any scheme list the roles it needs."""
+    """Return `openapi_extra` of a route that needs a key: OpenAPI 3.1 lets requirements of any scheme list roles."""
     return {"security": [{KEY_SCHEME: [scope]}]}
 
 
 def problem_responses(*statuses: int) -> dict[int | str, dict[str, Any]]:
-    """Entries for `responses=` of a route."""
+    """Return entries for `responses=` of a route that answers problems with these statuses."""
     content = {MEDIA_TYPE: {"schema": schema_reference(ProblemDetails)}}
     return {status: {"description": HTTPStatus(status).phrase, "content": content} for status in statuses}
 
 
 def header_docs(*names: str) -> dict[str, Any]:
-    """Of an entry for `responses=`: the headers that this answer always has."""
+    """Return the part of an entry for `responses=` that names headers, which the answer always has."""
     return {"headers": {name: {"required": True, **HEADERS[name]} for name in names}}

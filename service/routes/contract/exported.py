@@ -1,4 +1,4 @@
-"""Poses in the formats of other tools: what venues and jobs answer alike."""
+"""Export of poses to the formats of other tools, for venues and jobs."""
 
 from __future__ import annotations
 
@@ -18,9 +18,10 @@ from service.schemas.names import ID_PATTERN, FormatName, LensChoice
 from service.schemas.problems import Problem
 from service.schemas.results import Refined
 from service.schemas.venue import Venue
-from service.store.refined import with_refined
+from service.store.adoption import with_refined
+from service.store.refusals import no_refined_pose
 
-# Of `responses=`: what a document can be.
+# Entries for `responses=`: media types of exported documents.
 DOCUMENTS: dict[int | str, dict[str, Any]] = {
     200: {
         "content": {
@@ -37,7 +38,7 @@ DOCUMENTS: dict[int | str, dict[str, Any]] = {
 
 @dataclass(frozen=True)
 class ExportQuery:
-    """Which part of a document a caller asks for, and which he has."""
+    """Query of an export: the camera, the lens, and the entity tag that the caller has."""
 
     camera: Annotated[str | None, Query(pattern=ID_PATTERN, description="One camera; absent: all.")] = None
     lens: Annotated[
@@ -51,7 +52,7 @@ class ExportQuery:
 
 
 def export_response(context: Context, venue: Venue, called: str, form: FormatName, wanted: ExportQuery) -> Response:
-    """The poses of a venue as a file whose name begins with `called`."""
+    """Return the poses of a venue as a file whose name begins with `called`."""
     shots = _numbered_cameras(venue, wanted.camera)
     if wanted.lens == "refined":
         called = f"{called}-refined"
@@ -69,19 +70,14 @@ def export_response(context: Context, venue: Venue, called: str, form: FormatNam
 
 
 def with_refined_poses(venue: Venue, refined: dict[str, Refined], camera: str | None, why_none: str) -> Venue:
-    """A venue with refined poses and lenses, of one camera or of all; a `Problem` where one that is asked for has none.
+    """Return a venue with the refined poses and lenses of one camera or of all.
 
-    `why_none`: what the problem says about that.
+    Raises the problem `refined-not-found`, which says `why_none`, for a camera without one.
     """
     lacking = [shot.id for shot in _numbered_cameras(venue, camera) if shot.id not in refined]
     if lacking:
         raise no_refined_pose(lacking[0], f"{why_none} Or ask for lens=stored.")
     return with_refined(venue, refined)
-
-
-def no_refined_pose(camera: str, why: str) -> Problem:
-    """Answer who asks for a refined pose that a camera does not have."""
-    return Problem("refined-not-found", f"Camera {camera} has none: {why}", camera=camera)
 
 
 def _numbered_cameras(venue: Venue, camera: str | None) -> list[NumberedCamera]:

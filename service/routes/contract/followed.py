@@ -1,4 +1,4 @@
-"""Streams of server-sent events that clients follow: how many at once, and for how long."""
+"""Limits of streams of server-sent events: their number and duration."""
 
 from __future__ import annotations
 
@@ -17,5 +17,5 @@ async def _take_slot(context: InContext) -> AsyncIterator[None]:
         yield
 
 
-# Of `dependencies=`: the stream takes one of the service's slots for as long as it is followed.
+# Entry of `dependencies=`: the stream takes one of the service's slots for as long as it lasts.
 FOLLOWER_SLOT = Depends(_take_slot)

@@ -1,4 +1,4 @@
-"""Routes that insist on the scope that their documentation names."""
+"""Routes that check the scope that their documentation names."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ from service.schemas.names import Scope
 
 
 class Guarded(APIRoute):
-    """A route with `openapi_extra=needs(...)`: its security requirement is what is documented and what is checked.
+    """Route with `openapi_extra=needs_scope(...)`: its security requirement is both documented and checked.
 
-    It is checked before the body is read; FastAPI reads a body before it calls any dependency. So is, for a key that is
-    for some venues, whether the route is about one of them.
+    It is checked before the body is read: FastAPI reads a body before it calls any dependency. A key for some venues is
+    then refused unless the request is about one of them.
     """
 
     def __init__(self, path: str, endpoint: Callable[..., Any], **rest: Any) -> None:
         security = (rest.get("openapi_extra") or {}).get("security")
         if security is None:
-            raise TypeError(f"{path} must say who may call it: openapi_extra=needs(a scope) or =FOR_ALL")
+            raise TypeError(f"{path} must say who may call it: openapi_extra=needs_scope(...) or =FOR_ALL")
         self.needed: Scope | None = security[0][KEY_SCHEME][0] if security else None
         if self.needed:
             rest["responses"] = {**problem_responses(401, 403, 421, 429), **(rest.get("responses") or {})}
         super().__init__(path, endpoint, **rest)
 
     def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
-        """Check, then handle."""
+        """Return the handler of the route behind the checks."""
         handle, needed = super().get_route_handler(), self.needed
         takes_document = self.body_field is not None
         lists = restricted.is_list(self.endpoint)

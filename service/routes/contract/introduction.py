@@ -1,4 +1,4 @@
-"""What a stranger reads first in the OpenAPI document: the world, the order of steps, and what each group is for."""
+"""Introduction of the OpenAPI document: frames of reference, order of steps, and groups of routes."""
 
 from __future__ import annotations
 

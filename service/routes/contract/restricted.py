@@ -1,9 +1,8 @@
-"""What a key for some venues may call: whatever is about one of them, and the lists, which leave out all others.
+"""Limits of keys for some venues: they may call routes about one of these, and lists, which leave out all others.
 
-Anything else it may not, so that a route that is added is closed to such keys until somebody says how it is limited.
-A venue that the key is not for is answered with 404, whether it is there or not: 403 would tell one customer the names
-of the others, and who may not know of a venue cannot be told to ask for a larger scope. A route that is about no venue
-is answered with 403: that it is there is in the document for all to read.
+All other routes are closed to them, also those that are added later. A venue that the key is not for is answered with
+404, whether it is stored or not: 403 would tell one customer the names of the others. A route about no venue is
+answered with 403: the OpenAPI document shows to everybody that it exists.
 """
 
 from __future__ import annotations
@@ -15,22 +14,22 @@ from fastapi import Depends, Request
 from starlette.concurrency import run_in_threadpool
 
 from service.api.context import Context
-from service.routes.contract.missing import no_such_job
 from service.schemas.problems import Problem
 from service.store.keys import Key
+from service.store.refusals import no_such_job
 
 Endpoint = TypeVar("Endpoint", bound=Callable[..., Any])
 LISTS = "lists_by_venue"
 
 
 def lists_by_venue(endpoint: Endpoint) -> Endpoint:
-    """Mark a route that is about all venues and leaves out those that `OnlyVenues` does not name."""
+    """Mark a route that lists all venues, and leaves out those that `OnlyVenues` does not name."""
     setattr(endpoint, LISTS, True)
     return endpoint
 
 
 def is_list(endpoint: Callable[..., Any]) -> bool:
-    """Whether a route is marked so."""
+    """True if a route is marked by `lists_by_venue`."""
     return getattr(endpoint, LISTS, False)
 
 
@@ -44,9 +43,9 @@ OnlyVenues = Annotated[frozenset[str] | None, Depends(_only_venues)]
 
 
 async def check(request: Request, key: Key, *, lists: bool) -> None:
-    """Refuse a request that is not about a venue of the caller's key. `lists`: the route leaves out what it is not for.
+    """Raise a problem if a request is not about a venue of the caller's key; `lists`: the route is a list.
 
-    Raises the problem that is answered where there is no such venue or job.
+    It is the problem of a venue or job that does not exist.
     """
     if key.venues is None or lists:
         return
@@ -57,7 +56,7 @@ async def check(request: Request, key: Key, *, lists: bool) -> None:
     elif "job_id" in about:
         context: Context = request.app.state.context
         if not key.is_for(await run_in_threadpool(context.jobs.venue_of, about["job_id"])):
-            raise no_such_job(context.settings)
+            raise no_such_job(context.settings.keep_jobs_days)
     else:
         raise Problem(
             "key-for-some-venues",

@@ -1,1 +1,1 @@
-"""Pictures and clicks in, a job out, a kind of job each."""
+"""Routes that submit jobs, one module for each kind of job."""

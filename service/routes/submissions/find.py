@@ -1,4 +1,4 @@
-"""Frames of cameras without poses in, a job out that finds these cameras."""
+"""Submission of searches: frames of cameras without poses become a job that finds these cameras."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ from service.routes.contract.documented import (
 )
 from service.routes.contract.guarded import Guarded
 from service.routes.submissions import forms, job_submission
-from service.routes.submissions.job_submission import FromSender, Sender, venue_is_stored
-from service.routes.venues import camera_of
+from service.routes.submissions.job_submission import FromSender, Sender
 from service.schemas.find import SoughtSite
 from service.schemas.job import Job
 from service.schemas.names import OPTIONS_PART, SITE_PART
 from service.schemas.options import FindOptions
 from service.schemas.problems import Problem
 from service.schemas.venue import Venue
+from service.store.refusals import camera_of, venue_is_stored
 
 router = APIRouter(tags=["jobs"], route_class=Guarded)
 
 MOST_CAMERAS = 32
-# Options that say of stored cameras what a site says of its own.
+# Options about stored cameras; a site says the same of its own.
 ABOUT_STORED = ("cameras", "find_lens", "position_radius_m")
 UPLOAD = form_body(
     FindOptions,
@@ -56,7 +56,6 @@ async def find(venue_id: VenueIdPath, request: Request, context: InContext, send
     The result has candidates of each camera with pose and lens, and `candidate/{camera}/{number}.jpg` shows them.
     Nothing is stored by itself: `POST /venues/{id}/adopt-found` creates the venue or moves its cameras.
     """
-    forms.require_form(request)
     await run_in_threadpool(forms.require_disk_space, context)
     await run_in_threadpool(job_submission.require_queue_room, context, venue_id, "find", sender)
     most = MOST_CAMERAS * context.settings.max_frames_per_camera
@@ -78,7 +77,7 @@ def _submit(context: Context, venue_id: str, form: FormData, sender: Sender) -> 
 
 
 def _sought_of_venue(stored: Venue, form: FormData, options: FindOptions) -> Collection[str]:
-    """The cameras of a stored venue that are to be found."""
+    """Return the cameras of a stored venue that are to be found."""
     # A camera may be called so, and its frame then is.
     if SITE_PART in form and SITE_PART not in stored.poses:
         raise venue_is_stored(stored.id)
@@ -91,7 +90,7 @@ def _sought_of_venue(stored: Venue, form: FormData, options: FindOptions) -> Col
 
 
 def _site(venue_id: str, form: FormData, options: FindOptions) -> SoughtSite:
-    """The site that was sent, as this service can look for its cameras."""
+    """Return the site that was sent; raises a problem if this service cannot look for its cameras."""
     if SITE_PART not in form:
         raise Problem(
             "site-missing",

@@ -1,4 +1,4 @@
-"""The forms that pictures come in: what is refused before it is read, the options and the frames in it."""
+"""Upload forms: checks before they are read, their options and their frames."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from fastapi import Request
 from pydantic import ValidationError
 from starlette.datastructures import FormData, UploadFile
 
+from service.api.body_limit import is_form
 from service.api.context import Context
 from service.api.problems import validation_problem
 from service.api.spool import Spool, parsed_form
 from service.intake import image_checks
-from service.routes.contract.missing import no_such_venue
 from service.schemas.base import Schema
 from service.schemas.events import callback_urls
 from service.schemas.find import SoughtSite
@@ -24,6 +24,7 @@ from service.schemas.options import Handling
 from service.schemas.problems import Problem
 from service.schemas.venue import Venue
 from service.settings import Settings
+from service.store.refusals import no_such_venue
 
 LONGEST_OPTIONS = 64 * 1024
 PARTS_TOO_MANY = 100
@@ -31,24 +32,18 @@ Chosen = TypeVar("Chosen", bound=Handling)
 Document = TypeVar("Document", bound=Schema)
 
 
-def require_form(request: Request) -> None:
-    """Refuse what is no form before it is read."""
-    if not request.headers.get("content-type", "").lower().startswith("multipart/form-data"):
-        raise Problem("not-multipart", "Send each picture as a file part of a form, as curl -F does.")
-
-
 def is_empty(request: Request) -> bool:
-    """Whether a request has no body."""
+    """True if a request has no body."""
     return request.headers.get("content-length", "0") == "0" and "transfer-encoding" not in request.headers
 
 
 def has_no_frames(form: FormData) -> bool:
-    """Whether a form has options at most."""
+    """True if a form has no parts but options."""
     return all(name == OPTIONS_PART for name in form)
 
 
 def require_disk_space(context: Context) -> None:
-    """Refuse an upload that would fill the disk before it is read."""
+    """Raise the problem `disk-full` for an upload that would fill the disk, before it is read."""
     if context.disk.is_short():
         raise Problem(
             "disk-full",
@@ -59,7 +54,7 @@ def require_disk_space(context: Context) -> None:
 
 
 def venue_for_upload(context: Context, venue_id: str) -> Venue:
-    """The venue that frames arrive for, if there is room for them: the upload is not read before."""
+    """Return the venue of an upload; raises a problem before it is read if there is no room for it."""
     stored = context.venues.get(venue_id)
     if stored is None:
         raise no_such_venue(venue_id)
@@ -69,22 +64,24 @@ def venue_for_upload(context: Context, venue_id: str) -> Venue:
 
 @asynccontextmanager
 async def parsed_upload(request: Request, context: Context, most_files: int) -> AsyncIterator[FormData]:
-    """The form of a request, with so many files at most; a few too many get the answer that names them.
+    """Yield the form of a request, with so many files at most; a few too many get the answer that names them.
 
-    Its files are on the disk; `context.uploads.content` reads one.
+    Its files are on the disk; `context.uploads.content` reads one. Raises a problem before it reads what is no form.
     """
+    if not is_form(request):
+        raise Problem("not-multipart", "Send each picture as a file part of a form, as curl -F does.")
     files = most_files + PARTS_TOO_MANY
     with context.uploads.admitted(request), Spool() as spool:
         yield await parsed_form(request, spool, files, PARTS_TOO_MANY, LONGEST_OPTIONS)
 
 
 def most_frames(context: Context, venue: Venue) -> int:
-    """How many frames the cameras of a venue may have together."""
+    """Return the number of frames that the cameras of a venue may have together."""
     return len(venue.cameras) * context.settings.max_frames_per_camera
 
 
 def parse_options(form: FormData, model: type[Chosen], settings: Settings) -> Chosen:
-    """The part `options`; without one, what the model is when nothing is chosen."""
+    """Return the part `options` of a form, or the default options without one."""
     options = parse_part(form, OPTIONS_PART, model, absent="{}")
     if options.callback_url is not None:
         callback_urls.check(options.callback_url, settings)
@@ -92,7 +89,7 @@ def parse_options(form: FormData, model: type[Chosen], settings: Settings) -> Ch
 
 
 def parse_part(form: FormData, name: str, model: type[Document], absent: str = "null") -> Document:
-    """The part of a form that is a document, or what it is taken to say where it is `absent`."""
+    """Return the part of a form that is a JSON document, or the value of `absent` without one."""
     parts = form.getlist(name)
     if len(parts) > 1:
         raise Problem("invalid-request", f"Send one {name} part.", errors=[])
@@ -115,7 +112,7 @@ def frames_by_camera(
     needed: Collection[str] | None = None,
     documents: Collection[str] = (OPTIONS_PART,),
 ) -> dict[str, list[UploadFile]]:
-    """The frames of each camera of a venue, in its order.
+    """Return the frames of each camera of a venue, in its order.
 
     `needed`: the cameras of which there must be some, None: all. `documents`: the parts that are no frames.
     """

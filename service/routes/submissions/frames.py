@@ -1,4 +1,4 @@
-"""Frames of all cameras of a venue in, a job out: checked once, stored, and queued before the answer leaves."""
+"""Submission of calibrations and field fits: frames are checked, stored, and queued as a job before the answer."""
 
 from __future__ import annotations
 
@@ -15,7 +15,6 @@ from service.schemas.job import Job
 from service.schemas.names import JobKind
 from service.schemas.options import FieldOptions, Options
 from service.schemas.venue import Venue
-from service.store.jobs.submission import SubmissionRefused
 
 router = APIRouter(tags=["jobs"], route_class=Guarded)
 
@@ -57,7 +56,6 @@ async def fit_field(venue_id: VenueIdPath, request: Request, context: InContext,
 async def _uploaded(
     model: type[Options | FieldOptions], venue_id: str, request: Request, context: Context, sender: Sender
 ) -> Response:
-    forms.require_form(request)
     stored = await run_in_threadpool(forms.venue_for_upload, context, venue_id)
     kind: JobKind = "calibration" if model is Options else "field"
     await run_in_threadpool(job_submission.require_queue_room, context, stored.id, kind, sender)
@@ -78,9 +76,6 @@ def submit(
 
 
 def fetch(context: Context, venue_id: str, options: Options, sender: Sender) -> Response:
-    """Make what the cameras of a venue show now a job."""
-    try:
-        job, new = context.from_sources.calibrate(venue_id, options, sender.idempotency_key, sender.origin)
-    except SubmissionRefused as refusal:
-        raise job_submission.refusal_problem(refusal, venue_id, context.settings) from None
-    return job_submission.submission_response(job, new)
+    """Submit frames that are fetched from the cameras of a venue."""
+    submitted = context.from_sources.calibrate(venue_id, options, sender.idempotency_key, sender.origin)
+    return job_submission.submission_response(*submitted)

@@ -1,4 +1,4 @@
-"""Photos of a board in, a job out that finds the lens."""
+"""Submission of lens calibrations: photos of a board become a job that finds the lens."""
 
 from __future__ import annotations
 
@@ -43,7 +43,6 @@ async def intrinsics(
     sender: FromSender,
 ) -> Response:
     """Submit photos of a board, from which a job finds the lens. Its picture `coverage.jpg` shows what it rests on."""
-    forms.require_form(request)
     await run_in_threadpool(forms.require_disk_space, context)
     await run_in_threadpool(job_submission.require_queue_room, context, None, "intrinsics", sender)
     async with forms.parsed_upload(request, context, context.settings.max_photos) as form:
@@ -58,7 +57,7 @@ def _submit(context: Context, form: FormData, sender: Sender) -> Response:
 
 
 def _photos(form: FormData, context: Context) -> dict[str, list[UploadFile]]:
-    """The photos by their names, those that share one told apart by a number."""
+    """Return the photos by name, with a number behind names that occur more than once."""
     files: dict[str, list[UploadFile]] = {}
     for part_name, part in form.multi_items():
         if part_name == OPTIONS_PART:
@@ -84,7 +83,7 @@ def _photos(form: FormData, context: Context) -> dict[str, list[UploadFile]]:
 
 
 def printable_name(filename: str | None, number: int) -> str:
-    """The last part of a file name, as far as it can be printed."""
+    """Return the last part of a file name, without characters that cannot be printed."""
     last = PurePath((filename or "").replace("\\", "/")).name
     shown = "".join(letter for letter in last if letter.isprintable())[-LONGEST_NAME:]
     return shown or f"photo {number + 1}"

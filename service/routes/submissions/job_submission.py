@@ -1,9 +1,9 @@
-"""What all routes that take pictures share once the form is there: its files are checked, stored, and become a job."""
+"""Submission of jobs: the files of a form are checked, stored, and become a job."""
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -13,36 +13,23 @@ from starlette.datastructures import UploadFile
 from service.api.context import Context
 from service.intake import image_checks
 from service.intake.submit import frame_paths
-from service.routes.contract.missing import no_such_venue
 from service.routes.jobs import job_response
-from service.routes.venues import RETRY_AFTER_S, venue_busy
 from service.schemas.find import SoughtSite
 from service.schemas.job import Job
 from service.schemas.names import JobKind
-from service.schemas.problems import Problem
 from service.schemas.venue import Venue
-from service.settings import Settings
 from service.store.ids import new_id
 from service.store.jobs.files import frame_path
-from service.store.jobs.submission import (
-    KeyReused,
-    QueueFull,
-    Submission,
-    SubmissionRefused,
-    VenueBusy,
-    VenueGone,
-    VenueReplaced,
-    VenueStored,
-)
+from service.store.jobs.submission import Submission
 from service.store.jobs.task import AnyOptions, Origin, kind_of, seeded
 
-# By camera, of photos by their names.
+# Files by camera; photos by name.
 Files = Mapping[str, Sequence[UploadFile]]
 
 
 @dataclass(frozen=True)
 class Sender:
-    """Whom a job comes from, and what they call it so that it is one job if they send it twice."""
+    """Origin of a request for a job, and its idempotency key: a request that is sent twice is one job."""
 
     idempotency_key: str | None
     origin: Origin
@@ -67,9 +54,9 @@ FromSender = Annotated[Sender, Depends(_sender)]
 def submit_files(
     context: Context, about: Venue | SoughtSite | None, options: AnyOptions, files: Files, sender: Sender
 ) -> tuple[Job, bool]:
-    """Check and store the files, and make them a job or find the job that they already are; says if it is new.
+    """Check and store files and submit them; return the job, which may be an older one, and True if it is new.
 
-    `about`: the venue, or one that is not stored yet; None: photos of a lens are about none.
+    `about`: the venue, or the site of one that is not stored yet; None for photos of a lens.
     """
     submission = _submission(context, about, options, files, sender)
 
@@ -78,30 +65,19 @@ def submit_files(
             for path, upload in zip(paths, files[name], strict=True):
                 with context.uploads.content(upload) as data:
                     context.blobs.put(path, data)
-                # Or it would lie beside the next one.
+                # Or it would stay in memory together with the next one.
                 del data
 
-    return enqueue(context, submission, store)
-
-
-def enqueue(context: Context, submission: Submission, store: Callable[[], None]) -> tuple[Job, bool]:
-    """A submission as a job, or the job that it already is; says if it is new. `store` puts its frames in place."""
-    try:
-        return context.intake.take(submission, store)
-    except SubmissionRefused as refusal:
-        raise refusal_problem(refusal, submission.venue_id or "", context.settings) from None
+    return context.intake.take(submission, store)
 
 
 def require_queue_room(context: Context, venue_id: str | None, kind: JobKind, sender: Sender) -> None:
-    """Refuse an upload that a full queue will refuse, before it is read."""
-    try:
-        context.submissions.require_place_for(venue_id, sender.idempotency_key, kind, context.settings.queue_limit)
-    except QueueFull as full:
-        raise refusal_problem(full, venue_id or "", context.settings) from None
+    """Raise the problem `queue-full` for an upload that a full queue will refuse, before it is read."""
+    context.submissions.require_place_for(venue_id, sender.idempotency_key, kind, context.settings.queue_limit)
 
 
 def submission_response(job: Job, new: bool) -> Response:
-    """To whoever submitted it: accepted, or what it already is."""
+    """Return 202 with a new job, 200 with one that the content already is."""
     return job_response(job, status=202 if new else 200)
 
 
@@ -150,36 +126,3 @@ def _submission(
         content_hash=content.hexdigest(),
         idempotency_key=sender.idempotency_key,
     )
-
-
-def venue_is_stored(venue_id: str) -> Problem:
-    """Answer who sends a site for a venue that is there."""
-    return Problem(
-        "venue-stored",
-        f"Venue {venue_id} says itself what it is: leave out the part site, and name in options.cameras those that are "
-        "to be found again.",
-    )
-
-
-def refusal_problem(refusal: SubmissionRefused, venue_id: str, settings: Settings) -> Problem:
-    """Why a submission becomes no job."""
-    match refusal:
-        case KeyReused():
-            return Problem("idempotency-key-reused", "Use a new key for new frames.", job=refusal.job_id)
-        case VenueBusy():
-            return venue_busy(refusal.job_id)
-        case VenueGone():
-            return no_such_venue(venue_id)
-        case VenueReplaced():
-            return Problem(
-                "venue-replaced",
-                "Its pitch, cameras or lenses were changed while the frames arrived; see that they fit and send again.",
-                headers={"Retry-After": str(RETRY_AFTER_S)},
-            )
-        case VenueStored():
-            return venue_is_stored(venue_id)
-        case QueueFull():
-            kept = f", and {refusal.kept} of {settings.queue_limit} places are kept for schedules that are due"
-            detail = f"{refusal.waiting} jobs wait{kept if refusal.kept else ''}; try again."
-            return Problem("queue-full", detail, headers={"Retry-After": "30"})
-    raise refusal

@@ -1,4 +1,4 @@
-"""Clicked points in, a job out that finds where a camera stands."""
+"""Submission of first poses: clicked points become a job that finds the pose of a camera."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from service.routes.contract.guarded import Guarded
 from service.routes.jobs import job_response, wait_for_end
 from service.routes.submissions import forms, job_submission
 from service.routes.submissions.job_submission import FromSender, Sender
-from service.routes.venues import camera_of
 from service.schemas.job import Job
 from service.schemas.names import ID_PATTERN, OPTIONS_PART
 from service.schemas.options import LocateOptions
 from service.schemas.problems import Problem
 from service.schemas.venue import Camera, Venue
+from service.store.refusals import camera_of
 
 router = APIRouter(tags=["jobs"], route_class=Guarded)
 
@@ -53,7 +53,6 @@ async def locate(
 
     The job takes about a second and waits for no calibration; with `wait` the answer is its end.
     """
-    forms.require_form(request)
     stored = await run_in_threadpool(forms.venue_for_upload, context, venue_id)
     await run_in_threadpool(job_submission.require_queue_room, context, stored.id, "locate", sender)
     async with forms.parsed_upload(request, context, 1) as form:
@@ -69,7 +68,7 @@ def _submit(context: Context, venue: Venue, camera_id: str, form: FormData, send
 
 
 def _frame(camera: Camera, form: FormData) -> list[UploadFile]:
-    """The frame that was sent, or none."""
+    """Return the frame that was sent, in a list that is empty without one."""
     frames = []
     for name, part in form.multi_items():
         if name == OPTIONS_PART:

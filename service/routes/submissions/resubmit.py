@@ -1,4 +1,4 @@
-"""The frames of a job once more: a new job, from the poses that hold now."""
+"""New jobs from the frames of old ones, beginning with the poses that are stored now."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from fastapi import APIRouter, Request, Response
 from service.api.context import Context, InContext
 from service.routes.contract.documented import needs_scope, problem_responses, submission_responses
 from service.routes.contract.guarded import Guarded
-from service.routes.contract.missing import no_such_venue
 from service.routes.jobs import ExistingJob
 from service.routes.submissions import forms, job_submission
 from service.schemas.job import Job
@@ -20,6 +19,7 @@ from service.store.ids import new_id
 from service.store.jobs.files import frame_folder
 from service.store.jobs.submission import Submission
 from service.store.jobs.task import Origin, UnreadableJob, seeded
+from service.store.refusals import no_such_venue
 
 router = APIRouter(prefix="/jobs", tags=["jobs"], route_class=Guarded)
 
@@ -71,7 +71,7 @@ def calibrate_found(job: ExistingJob, request: Request, context: InContext) -> R
         "site": None,
         "options": seeded(Options()),
         "frames": {camera: search.frames[camera] for camera in venue.poses},
-        # Asked for twice while it is open, it is one calibration.
+        # A request that is repeated while the calibration is open is the same job.
         "content_hash": hashlib.sha256(f"calibration of {job.id}".encode()).hexdigest(),
     }
     return _submit_copy(context, job, search.model_copy(update=of_search), request.state.origin)
@@ -90,7 +90,7 @@ def submit(context: Context, job: Job, origin: Origin) -> Response:
 
 
 def _kept(context: Context, job: Job) -> Submission:
-    """Return what a job was made of; raise a `Problem` where this version cannot read it or its frames are gone."""
+    """Return the submission of a job; raises a problem if this version cannot read it or its frames are gone."""
     try:
         kept = context.submissions.of(job.id)
     except UnreadableJob as error:
@@ -114,11 +114,11 @@ def _submit_copy(context: Context, job: Job, wanted: Submission, origin: Origin)
                     raise _gone(context, job)
 
     submission = wanted.model_copy(update=changes)
-    return job_submission.submission_response(*job_submission.enqueue(context, submission, store))
+    return job_submission.submission_response(*context.intake.take(submission, store))
 
 
 def _require_the_same(context: Context, then: Venue) -> None:
-    """Frames of another pitch, other cameras or lenses are frames of another venue."""
+    """Raise the problem `venue-replaced` if the pitch, the cameras or their lenses were changed since."""
     now = context.venues.get(then.id)
     if now is None:
         raise no_such_venue(then.id)

@@ -15,8 +15,9 @@ from service.store import tables
 from service.store.alarms import update_alarms
 from service.store.database import Repository, advisory_lock, clock, reading, writing
 from service.store.jobs.ending import changed, end_job, still_open
-from service.store.jobs.queries import found_poses
+from service.store.jobs.queries import found_poses, read_job
 from service.store.memories import Memories, newest_memories
+from service.store.refusals import nothing_to_decide, venue_moved_on
 from service.store.revisions import CALIBRATION_CAUSES, newest_revision, revision_before, revision_of_job
 from service.store.statistics.venue_quality import update_quality
 from service.store.trends import note_night
@@ -32,17 +33,6 @@ from service.store.venues import (
 )
 
 j = tables.jobs.c
-
-
-class NoPoses(Exception):  # noqa: N818
-    """The job is no calibration that found poses (yet)."""
-
-
-class VenueHasChanged(Exception):  # noqa: N818
-    """The venue is not as the job left or found it: to decide about the job would undo other changes."""
-
-    def __init__(self, newest: Revision | None) -> None:
-        self.newest = newest
 
 
 @dataclass(frozen=True)
@@ -90,8 +80,8 @@ class DecisionRepository(Repository):
         """Let the poses that a calibration found hold, whatever the gate said.
 
         If they hold by themselves, a person now says so too: the trends of the cameras begin anew with them.
-        `cameras`: only theirs, None: those of all. Raises `VenueHasChanged` if the venue is neither as the calibration
-        began with it nor as it left it, `NoPoses` if it found none, `VenueRefused` if no venue can have them.
+        `cameras`: only theirs, None: those of all. Raises the problems `venue-moved-on` if the venue is neither as the
+        calibration began with it nor as it left it, `poses-not-found`, and `poses-refused` if no venue can have them.
         """
         with writing(self._engine) as connection:
             began_with, result, newest = _found(connection, job_id)
@@ -111,7 +101,7 @@ class DecisionRepository(Repository):
                     update_alarms(connection, quality, now_stored)
                 return
             if stored is None or not _untouched(stored.venue, began_with, result, taken=left_by_it):
-                raise VenueHasChanged(newest)
+                raise venue_moved_on(began_with.id, job_id, newest)
             memories = _without_refused(newest_memories(connection, began_with.id), result, chosen)
             with update_quality(connection, began_with.id) as quality:
                 quality.calibrated(result, moved=True)
@@ -121,14 +111,14 @@ class DecisionRepository(Repository):
     def reject(self, job_id: str, by: Actor | None = None) -> None:
         """Put back what was before a calibration's poses held; nothing to do if they never did or were put back.
 
-        Raises `VenueHasChanged` if something else has come since, `NoPoses` if it found none.
+        Raises the problems `venue-moved-on` if something else has come since, and `poses-not-found`.
         """
         with writing(self._engine) as connection:
             began_with, _, newest = _found(connection, job_id)
             if newest is None or revision_of_job(connection, job_id) is None:
                 return
             if newest.job != job_id or newest.cause == "adopted":
-                raise VenueHasChanged(newest)
+                raise venue_moved_on(began_with.id, job_id, newest)
             if newest.cause in CALIBRATION_CAUSES:
                 stored = find_replaceable(connection, began_with.id)
                 assert stored is not None
@@ -143,7 +133,7 @@ def _found(connection: sa.Connection, job_id: str) -> tuple[Venue, Result, Revis
     """Return the input and result of a calibration, and the newest revision of its venue, which is locked."""
     found = found_poses(connection, job_id)
     if found is None:
-        raise NoPoses
+        raise nothing_to_decide(read_job(connection, job_id))
     began_with, result = found
     advisory_lock(connection, venue_lock(began_with.id))
     return began_with, result, newest_revision(connection, began_with.id)

@@ -11,6 +11,7 @@ import sqlalchemy as sa
 from service.schemas.job import Job, JobError
 from service.schemas.names import JobKind, JobStatus
 from service.schemas.options import Options
+from service.schemas.problems import Problem
 from service.schemas.venue import Venue
 from service.store import tables
 from service.store.database import Repository, advisory_lock, clock, reading, writing
@@ -21,6 +22,7 @@ from service.store.jobs.attempts import Enqueue, end_without_result
 from service.store.jobs.files import frame_folder
 from service.store.jobs.queries import ONE, job_input_values, read_job
 from service.store.jobs.task import JobInput, parse_job_input
+from service.store.refusals import RETRY_AFTER_S, no_such_venue, venue_busy, venue_is_stored
 from service.store.schedules import reserved_places
 from service.store.venues import find_venue, venue_lock
 
@@ -51,53 +53,13 @@ def fetched_hash(options: Options) -> str:
     return FETCHED + hashlib.sha256(options.model_dump_json().encode()).hexdigest()[: 64 - len(FETCHED)]
 
 
-class SubmissionRefused(Exception):  # noqa: N818
-    """Why a submission becomes no job."""
-
-
-class KeyReused(SubmissionRefused):
-    """The idempotency key belongs to a job of other content."""
-
-    def __init__(self, job_id: str) -> None:
-        self.job_id = job_id
-
-
-class VenueBusy(SubmissionRefused):
-    """The venue has an active job of other content."""
-
-    def __init__(self, job_id: str) -> None:
-        self.job_id = job_id
-
-
-class VenueGone(SubmissionRefused):
-    """The venue was deleted while its frames arrived."""
-
-
-class VenueReplaced(SubmissionRefused):
-    """The pitch or a lens of the venue was changed while its frames arrived: they were checked against another one."""
-
-
-class VenueStored(SubmissionRefused):
-    """The venue whose cameras were to be found before it is stored is stored by now."""
-
-
-class QueueFull(SubmissionRefused):
-    """As many jobs wait as may."""
-
-    def __init__(self, waiting: int, kept: int) -> None:
-        """`waiting`: the jobs that wait; `kept`: the places that are kept for schedules that are due."""
-        self.waiting = waiting
-        self.kept = kept
-
-
 class SubmissionRepository(Repository):
     """The beginning of the jobs in the database."""
 
     def announce(self, submission: Submission, queue_limit: int, grace: timedelta) -> Job | None:
         """Return the job that the content already is; else None, and its frames may be stored.
 
-        Unless these become the job within the `grace`, they are deleted. Raises `QueueFull` where it would find no
-        place.
+        Unless these become the job within the `grace`, they are deleted. Raises the problem `queue-full`.
         """
         with writing(self._engine) as connection:
             same = _duplicate(
@@ -124,7 +86,7 @@ class SubmissionRepository(Repository):
             if same is not None:
                 return read_job(connection, same), False
             if submission.site is not None and find_venue(connection, submission.site.id) is not None:
-                raise VenueStored
+                raise venue_is_stored(submission.site.id)
             venue = None if submission.venue is None else _as_it_is_now(connection, submission.venue)
             # From here on the frames are the job's.
             folder = frame_folder(submission.job_id)
@@ -159,14 +121,14 @@ class SubmissionRepository(Repository):
             return _waiting(connection)
 
     def require_place(self, queue_limit: int, *, is_schedule: bool) -> None:
-        """Raise `QueueFull` where what is submitted now would find no place."""
+        """Raise the problem `queue-full` unless the queue has a place for a job that is submitted now."""
         with reading(self._engine) as connection:
             _require_place(connection, _waiting(connection), queue_limit, is_schedule=is_schedule)
 
     def require_place_for(
         self, venue_id: str | None, idempotency_key: str | None, kind: JobKind, queue_limit: int
     ) -> None:
-        """Raise `QueueFull` where what is sent now would find no place, unless it may be an old job sent again."""
+        """Raise the problem `queue-full` unless the queue has a place, or the request may be an old job sent again."""
         with reading(self._engine) as connection:
             if _of_key(connection, venue_id, idempotency_key) is not None:
                 return
@@ -224,19 +186,18 @@ def _insert(
 
 
 def _require_place(connection: sa.Connection, before: int, queue_limit: int, *, is_schedule: bool) -> None:
-    """Raise `QueueFull` unless a job may wait behind the jobs that wait `before` it.
+    """Raise the problem `queue-full` unless a job may wait behind the jobs that wait `before` it.
 
     Whoever submits again and again would else take every place that becomes free before a schedule sees it. So a place
     is kept for each schedule that is due, in half of the queue at most.
     """
     most_kept = (queue_limit + 1) // 2
-    if before >= queue_limit:
-        raise QueueFull(before, 0)
-    if is_schedule or before + most_kept < queue_limit:
+    if before < queue_limit and (is_schedule or before + most_kept < queue_limit):
         return
-    kept = reserved_places(connection, clock(connection), most_kept)
+    kept = 0 if before >= queue_limit else reserved_places(connection, clock(connection), most_kept)
     if before + kept >= queue_limit:
-        raise QueueFull(before, kept)
+        why = f", and {kept} of {queue_limit} places are kept for schedules that are due" if kept else ""
+        raise Problem("queue-full", f"{before} jobs wait{why}; try again.", headers={"Retry-After": "30"})
 
 
 def _waiting(connection: sa.Connection) -> int:
@@ -244,12 +205,16 @@ def _waiting(connection: sa.Connection) -> int:
 
 
 def _as_it_is_now(connection: sa.Connection, read: Venue) -> Venue:
-    """The venue, if frames of the one that was read are frames of it."""
+    """Return the stored venue; raises a problem if it is gone, or frames of the one that was `read` do not fit it."""
     venue = find_venue(connection, read.id)
     if venue is None:
-        raise VenueGone
+        raise no_such_venue(read.id)
     if not venue.accepts_frames_of(read):
-        raise VenueReplaced
+        raise Problem(
+            "venue-replaced",
+            "Its pitch, cameras or lenses were changed while the frames arrived; see that they fit and send again.",
+            headers={"Retry-After": str(RETRY_AFTER_S)},
+        )
     return venue
 
 
@@ -259,7 +224,7 @@ def _duplicate(
     known = _of_key(connection, venue_id, idempotency_key)
     if known is not None:
         if known.content_hash != content_hash:
-            raise KeyReused(known.id)
+            raise _key_reused(known.id)
         return str(known.id)
     if kind != "calibration":
         return None
@@ -270,9 +235,13 @@ def _duplicate(
     if active.content_hash != content_hash:
         # Without the lock, the job of this key may have come since the key was looked up.
         if idempotency_key is not None and active.idempotency_key == idempotency_key:
-            raise KeyReused(active.id)
-        raise VenueBusy(active.id)
+            raise _key_reused(active.id)
+        raise venue_busy(active.id)
     return str(active.id)
+
+
+def _key_reused(job_id: str) -> Problem:
+    return Problem("idempotency-key-reused", "Use a new key for new frames.", job=job_id)
 
 
 def _of_key(connection: sa.Connection, venue_id: str | None, idempotency_key: str | None) -> Any:

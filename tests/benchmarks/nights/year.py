@@ -16,8 +16,8 @@ from pathlib import Path
 import numpy as np
 
 from service.schemas.health import Alarms as Rules
+from service.schemas.problems import Problem
 from service.schemas.results import CameraResult, Result
-from service.store.refined import NoRefinedPose
 from tests.benchmarks.lenses import SIGMAS
 from tests.benchmarks.nights.changes import HEAT
 from tests.benchmarks.nights.single import LEAST_WRONG_M
@@ -25,7 +25,7 @@ from tests.benchmarks.scenes import FOCAL_ERROR
 from tests.demo.render import outdated
 from tests.worker.calibration.synthetic import CROWNED
 from tests.worker.duties.year import VENUE, Year, cameras, fast_motion, frames_of, longer, stored
-from tests.worker.stock import Stock, anyway
+from tests.worker.stock import Stock
 from worker.calibration.geometry.camera import Camera, Pose
 from worker.calibration.geometry.field import Field, Marking
 from worker.calibration.geometry.rotation import rotation_matrices, rotation_vectors
@@ -114,8 +114,8 @@ def adopt_refined(year: Year, _: Mapping[str, Camera]) -> str:
     """The refined lens of the right camera is stored."""
     before = next(c for c in year.venue.cameras if c.id == "right").intrinsics.matrix[0][0]
     try:
-        after = year.home.refined.adopt(VENUE, "right", anyway)
-    except NoRefinedPose:
+        after = year.home.adoption.adopt_refined(VENUE, "right")
+    except Problem:
         return "adopting the refined lens of right: there is none"
     lens = next(c for c in after.cameras if c.id == "right").intrinsics
     return f"refined lens of right adopted: {lens.matrix[0][0] / before - 1:+.2%}"
@@ -135,7 +135,7 @@ def put_right(year: Year, truth: Mapping[str, Camera]) -> str:
     """The lens and the first pose of the new camera are stored."""
     venue, new = year.venue, stored([truth["right"]], RULES, SIGMA).cameras[0]
     cameras_now = [new if c.id == "right" else c for c in venue.cameras]
-    year.home.venues.put(venue.model_copy(update={"cameras": cameras_now}), anyway)
+    year.home.venues.put(venue.model_copy(update={"cameras": cameras_now}))
     return "lens and pose of right PUT"
 
 

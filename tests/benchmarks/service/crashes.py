@@ -12,7 +12,7 @@ from pathlib import Path
 
 import sqlalchemy as sa
 
-from service.serving import YOUNG_S
+from service.serving import MIN_HEALTHY_UPTIME_S
 from service.store import tables
 from tests.benchmarks.service.stage import SERVERS, homes, service, spread
 from tests.e2e.books import settle
@@ -58,7 +58,7 @@ def _kept_workers(home: Home, moments: int) -> str:
         whole = seconds_of_a_job(running, running.venue("alone", COMPUTES))
         for number in range(moments):
             # One that died young is started again ever later: that is another matter.
-            time.sleep(YOUNG_S)
+            time.sleep(MIN_HEALTHY_UPTIME_S)
             ended, after_s = kill_kept_worker(running, running.venue(f"v{number}", COMPUTES), moment(drawn, whole))
             ends.append(ended)
             seconds.append(after_s)

@@ -36,7 +36,7 @@ from tests.benchmarks.service.stage import homes, resident_mb
 from tests.e2e.running import venue
 from tests.homes import Home as Place
 from tests.homes import files
-from tests.worker.stock import anyway, result
+from tests.worker.stock import result
 from worker.duties.retention import BETWEEN_ROUNDS_S, FOLDERS_OF_A_JOB, Retention
 
 VENUES, CAMERAS = 100, ("left", "right")
@@ -125,7 +125,7 @@ def _month(place: Place, days: int, jobs: int) -> list[Day]:
         retention = Retention(settings, counted, home.blobs, home.workers, home.queue.forget)
         for number in range(VENUES):
             stored = VenueIn.model_validate(venue(f"v{number}", cameras=CAMERAS)).to_venue()
-            home.venues.put(stored, anyway)
+            home.venues.put(stored)
         begun = home.expiry.now()
         measured = []
         for number in range(1, days + 1):

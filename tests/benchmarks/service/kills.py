@@ -20,7 +20,7 @@ from dataclasses import dataclass, field
 
 import httpx
 
-from service.serving import YOUNG_S
+from service.serving import MIN_HEALTHY_UPTIME_S
 from tests.benchmarks.service.stage import EMBEDDED, SERVERS, SURE, homes, service, spread
 from tests.e2e.books import settle
 from tests.e2e.killing import A_LITTLE_LONGER, submitted
@@ -72,7 +72,7 @@ def _round(running: Service, home: Home, seed: int, victim: str, drawn: random.R
     print(f"seed {seed}: {victim} of {type(home).__name__} after {after_s:.3f} s, {jobs} jobs", file=sys.stderr)
     running.ready()
     # A worker that died young is started again ever later: that is another matter.
-    time.sleep(YOUNG_S)
+    time.sleep(MIN_HEALTHY_UPTIME_S)
     venues = [running.venue(f"v{seed}-{number}", COMPUTES) for number in range(jobs)]
     promised: dict[str, str] = {}
 

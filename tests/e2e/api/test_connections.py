@@ -13,7 +13,7 @@ import pytest
 from tests.e2e.running import Service, upload, wait_for
 
 CONNECTIONS, STRANGERS = 60, 400
-# Of its own files, and of those of the connections above.
+# Limit of open files: its own, and those of the connections above.
 OPEN_FILES = 260
 ANSWER_S = 10
 

@@ -333,7 +333,7 @@ def sockets(service: Service) -> int:
 
 
 def holds(service: Service, port: int) -> bool:
-    """Whether the service has an open socket to this port of ours."""
+    """True if the service has an open socket to this port of ours."""
     ends = [line.split() for line in proc(service, "net/tcp").read_text().splitlines()[1:]]
     server = f"{httpx.URL(service.url).port:04X}"
     sockets = {end[9] for end in ends if end[1].endswith(f":{server}") and end[2].endswith(f":{port:04X}")}
@@ -341,7 +341,7 @@ def holds(service: Service, port: int) -> bool:
 
 
 def metrics(service: Service) -> set[str]:
-    """What is counted: each method and path of its own would be more of it."""
+    """Names of all metrics: one more for each method and path that is counted apart."""
     return {line.rpartition(" ")[0] for line in service.http.get("/metrics").text.splitlines()}
 
 

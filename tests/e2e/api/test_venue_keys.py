@@ -66,7 +66,7 @@ def addressed(path, job, venue_id):
 
 
 def called(service, method, path):
-    """What a key for one venue is answered, whatever a request has for its body."""
+    """Answer to a key for one venue, whatever the body of its request is."""
     bodies = [{}]
     if method in ("POST", "PUT", "PATCH"):
         kind = "application/merge-patch+json" if method == "PATCH" else "application/json"

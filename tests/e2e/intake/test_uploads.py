@@ -1,4 +1,4 @@
-"""What bad input gets: an answer that names the camera and what to do, and a service that is still there."""
+"""Bad uploads: the answer names the camera and what to do, and the service goes on."""
 
 import json
 import re

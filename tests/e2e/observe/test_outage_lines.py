@@ -32,7 +32,7 @@ def test_a_database_that_is_away_is_a_line_a_minute_for_each_thing_that_fails_an
     minutes = 1 + int((time.monotonic() - begun) // 60)
     # The same thing may fail in two ways: a connection that ends, and one that is refused.
     failures = Counter((line["event"], line["error"].partition(":")[0]) for line in lines if "error" in line)
-    assert any(event == "storage is away" for event, _ in failures)
+    assert any(event == "storage unavailable" for event, _ in failures)
     assert max(failures.values()) <= minutes
     assert not [line for line in lines if "exception" in line]
     assert Counter(line["event"] for line in lines)["request"] >= 30

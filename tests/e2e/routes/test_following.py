@@ -43,7 +43,7 @@ class Stream:
         raise EOFError
 
     def until(self, name: str) -> list[dict]:
-        """Those up to the first of a name."""
+        """Events up to the first of a name."""
         events = [self.next()]
         while events[-1]["event"] != name:
             events.append(self.next())

@@ -1,4 +1,4 @@
-"""Who made each change, from where and by which request, as the history and the events tell it."""
+"""Attribution of changes in history and events: key, address and request."""
 
 import json
 import time
@@ -91,7 +91,7 @@ def test_a_webhook_gets_no_address(engine):
     venues, following = VenueRepository(engine), EventRepository(engine)
     by = Actor(name="key truck", address=TRUCK, request_id="put-1")
     stored = VenueIn.model_validate(VENUE_EXAMPLE).to_venue()
-    venues.put(stored, lambda _: None, by=by)
+    venues.put(stored, by=by)
     number = following.newest([stored.id])[stored.id]
     assert following.since(stored.id, 0, [], 1).events[0].event.by == by
     assert following.get(number).by == Actor(name="key truck", address=None, request_id="put-1")
@@ -118,7 +118,7 @@ def test_the_log_line_of_a_request_has_the_address_of_its_client(asking, name):
 
 
 def request_line(service, request_id):
-    """That of a request in the log; it is written once the answer has been sent."""
+    """Line of a request in the log; it is written once the answer has been sent."""
     for _ in range(100):
         lines = [line for line in (service.data / "log").read_text().splitlines() if request_id in line]
         found = [line for line in map(json.loads, lines) if line["event"] == "request"]

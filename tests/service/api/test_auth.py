@@ -1,4 +1,4 @@
-"""The gate with a real database and a clock that is told the time."""
+"""Authentication with a real database and a clock that the tests set."""
 
 import asyncio
 from datetime import UTC, datetime, timedelta
@@ -41,7 +41,7 @@ def clock():
 
 @pytest.fixture
 def gate(keys, sessions, clock):
-    """Of a service that listens on loopback."""
+    """Authenticator of a service that listens on loopback."""
     return Authenticator(keys, sessions, Settings(), clock)
 
 

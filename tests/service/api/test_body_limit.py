@@ -1,4 +1,4 @@
-"""How large a request may be, by its kind and however it says its size."""
+"""Limits of the size of requests, by their kind and however they announce their size."""
 
 import asyncio
 

@@ -51,13 +51,13 @@ def fetches(noted):
 
 
 def test_all_who_look_within_seconds_share_one_fetch(snapshots, noted, monkeypatch):
-    monkeypatch.setattr(camera_views, "HELD_FOR_S", 0.5)
+    monkeypatch.setattr(camera_views, "CACHE_S", 0.5)
 
     async def look():
         views = CameraViews(snapshots)
         at_once = await asyncio.gather(*(views.frame("v", camera(), {}) for _ in range(20)))
         first = fetches(noted)
-        # Of another source, or with another password, it is another picture.
+        # Another source, or another password, is another picture.
         await views.frame("v", camera(host="other"), {})
         await views.frame("v", camera(), {"c0": "user:password"})
         await asyncio.sleep(0.6)
@@ -96,8 +96,8 @@ def test_a_camera_that_is_away_is_asked_once_for_all_who_look(snapshots, noted):
 
 
 def test_what_is_held_has_a_limit(snapshots, noted, monkeypatch):
-    monkeypatch.setattr(camera_views, "HELD_BYTES", len(png()))
-    monkeypatch.setattr(camera_views, "HELD_FOR_S", 60)
+    monkeypatch.setattr(camera_views, "CACHE_BYTES", len(png()))
+    monkeypatch.setattr(camera_views, "CACHE_S", 60)
 
     async def look():
         views = CameraViews(snapshots)

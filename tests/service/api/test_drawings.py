@@ -6,7 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from service.api.programs import drawings
+from service.api.programs import program_pool
 from service.api.programs.drawings import Drawings
 from service.schemas.problems import Problem
 from service.settings import Settings
@@ -51,7 +51,7 @@ def job(stock):
 
 
 def look(drawn_by, stock, job, *names):
-    """What several who look at once see."""
+    """Pictures that several clients get who ask at once."""
 
     async def at_once():
         pictures = stock.jobs.pictures(job)
@@ -112,7 +112,7 @@ def test_nothing_is_left_of_a_picture_whose_time_ended_while_it_was_drawn(stock,
 
 
 def test_who_waits_too_long_for_a_turn_is_told_to_come_again(stock, drawing, job, monkeypatch):
-    monkeypatch.setattr(drawings, "PATIENCE_S", 0.1)
+    monkeypatch.setattr(program_pool, "PATIENCE_S", 0.1)
     with pytest.raises(Problem) as busy:
         look(drawing(pause=1), stock, job, "birdseye", "birdseye")
     assert (busy.value.kind, busy.value.headers) == ("unavailable", {"Retry-After": "2"})

@@ -3,40 +3,25 @@
 import asyncio
 import json
 import sys
-import threading
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 from anyio.to_thread import current_default_thread_limiter
 
-from service.api.programs import clicked_pose
+from service.api.programs import program_pool
 from service.api.programs.clicked_pose import ClickedPoses
-from service.api.programs.running import OneAtATime
+from service.api.programs.program_pool import ProgramPool, run_program
+from service.formats import stmap
 from service.schemas.problems import Problem
 from service.schemas.programs.clicked_pose import ClickedPoseRequest
 from service.settings import Settings
-from tests.e2e.running import venue
+from tests.e2e.running import venue, wait_for
+from tests.service.formats.cameras import shot
 
 SLOW = [sys.executable, "-c", "import sys, time; time.sleep(0.5); sys.stdout.write(sys.stdin.read())"]
 HANGING = [sys.executable, "-c", "import time; time.sleep(600)"]
 TELLING = [sys.executable, "-c", "import json, os; print(json.dumps(dict(os.environ)))"]
 QUICK = [sys.executable, "-c", "import sys; sys.stdout.write(sys.stdin.read())"]
-
-
-@pytest.fixture
-def begun():
-    """Let one run begin, and wait for its end afterwards."""
-    threads = []
-
-    def begin(programs):
-        first = threading.Thread(target=programs.run, args=(SLOW, {}, b"first"))
-        first.start()
-        threads.append(first)
-        while not programs._turn.locked():
-            pass
-
-    yield begin
-    for thread in threads:
-        thread.join()
 
 
 def clicked():
@@ -68,7 +53,7 @@ def test_who_waits_for_a_turn_holds_no_thread():
 
 
 def test_who_has_waited_long_enough_for_a_turn_is_told_to_come_again(monkeypatch):
-    monkeypatch.setattr(clicked_pose, "PATIENCE_S", 0.1)
+    monkeypatch.setattr(program_pool, "PATIENCE_S", 0.1)
     poses = ClickedPoses(Settings(pose_program=answering(1)))
 
     async def click():
@@ -79,26 +64,27 @@ def test_who_has_waited_long_enough_for_a_turn_is_told_to_come_again(monkeypatch
     assert (second.kind, second.headers) == ("unavailable", {"Retry-After": "1"})
 
 
-def test_who_comes_meanwhile_is_told_to_come_again(begun):
-    programs = OneAtATime("pose", longest_s=30, again_s=7)
-    begun(programs)
-    with pytest.raises(Problem, match="Another pose is being made") as told:
-        programs.run(QUICK, {}, b"second")
-    assert told.value.headers == {"Retry-After": "7"}
+def test_a_second_set_of_st_maps_meanwhile_is_refused():
+    with ThreadPoolExecutor(1) as aside:
+        first = aside.submit(stmap.write, shot([]), "top-left", SLOW, {})
+        wait_for(stmap._turn.locked)
+        with pytest.raises(Problem, match="Another set of ST maps is being made") as told:
+            stmap.write(shot([]), "top-left", QUICK, {})
+    assert told.value.headers == {"Retry-After": "10"}
+    assert first.result() == stmap.write(shot([]), "top-left", QUICK, {})
 
 
 def test_a_program_that_takes_too_long_is_given_up_and_the_next_one_runs():
-    programs = OneAtATime("pose", longest_s=3, again_s=1)
-    with pytest.raises(Problem, match="not done after 3 s"):
-        programs.run(HANGING, {}, b"")
-    assert programs.run(QUICK, {}, b"next") == b"next"
+    programs = ProgramPool("pose", longest_s=3)
+    with pytest.raises(Problem, match="The pose was not done after 3 s"):
+        asyncio.run(programs.run(HANGING, {}, b""))
+    assert asyncio.run(programs.run(QUICK, {}, b"next")) == b"next"
 
 
 def test_a_program_sees_no_secret_of_the_service(monkeypatch):
     secrets = ("ESC_DATABASE_URL", "ESC_WEBHOOK_SECRET", "AWS_SECRET_ACCESS_KEY")
     for name in (*secrets, "LD_LIBRARY_PATH"):
         monkeypatch.setenv(name, "x")
-    programs = OneAtATime("pose", longest_s=30, again_s=1)
-    seen = json.loads(programs.run(TELLING, {"OMP_NUM_THREADS": "1"}, b""))
+    seen = json.loads(run_program("pose", TELLING, {"OMP_NUM_THREADS": "1"}, b"", 30))
     assert {"PATH", "LD_LIBRARY_PATH", "OMP_NUM_THREADS"} <= seen.keys()
     assert not seen.keys() & set(secrets)

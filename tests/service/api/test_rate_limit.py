@@ -19,7 +19,7 @@ def clock():
 
 
 def takes(buckets, name):
-    """How many tokens there are."""
+    """Number of tokens in a bucket."""
     taken = 0
     while not buckets.wait_s(name):
         buckets.take(name)

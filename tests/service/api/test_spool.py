@@ -45,7 +45,7 @@ def parsed(body, use, piece=PIECE):
 
 
 def descriptors():
-    """How many this process has open."""
+    """Number of open descriptors of this process."""
     return len(list(Path("/proc/self/fd").iterdir()))
 
 
@@ -66,7 +66,7 @@ def test_files_are_read_as_they_were_sent_however_they_came(piece):
 
 
 def test_many_files_take_one_descriptor():
-    # Of a size that Starlette would open a file each for.
+    # Starlette would open a file for each of this size.
     body = form(*[bytes(1_100_000)] * 40)
     before = descriptors()
     opened = parsed(body, lambda _: descriptors())

@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from service.api.programs import drawings
+from service.api.programs import program_pool
 from service.api.programs.stitches import Stitches
 from service.schemas.problems import Problem
 from service.schemas.venue import VenueIn
@@ -73,6 +73,6 @@ def test_previews_wait_for_each_other_and_not_for_ever(tmp_path, monkeypatch):
     with_frame, without = asyncio.run(both(slow))
     assert with_frame.endswith(b"\nframe")
     assert b'"width_px":1280,"height_px":334' in without
-    monkeypatch.setattr(drawings, "PATIENCE_S", 0.1)
+    monkeypatch.setattr(program_pool, "PATIENCE_S", 0.1)
     with pytest.raises(Problem, match="Other pictures are being drawn"):
         asyncio.run(both(stitches(SLOW.format(begun=str(tmp_path / "begun"), pause=0.5))))

@@ -14,7 +14,7 @@ DEMO = VenueIn.model_validate_json((Path(__file__).parents[2] / "demo" / "venue.
 
 
 def warned(change):
-    """What is said of the demo's left camera with parts of it changed by what `change` makes of its true pose."""
+    """Warnings about the demo's left camera, with the parts that `change` makes of its true pose."""
     document = DEMO.model_dump(mode="json", exclude_none=True)
     camera = document["cameras"][0]
     camera |= change(Pose.from_input(DEMO.cameras[0].pose))
@@ -27,7 +27,7 @@ def test_nothing_is_said_of_poses_that_look_at_the_field():
 
 
 def camera_to_world(pose):
-    """As Blender and COLMAP's viewers have it: the camera's axes and its place in the world."""
+    """Pose in the convention of Blender and COLMAP's viewers: the camera's axes and its place in the world."""
     return {"pose": {"rotation": [-c for c in pose.rotation], "translation": pose.position}}
 
 

@@ -1,4 +1,4 @@
-"""What fetches frames."""
+"""Frames that are fetched from sources."""
 
 import json
 import sys

@@ -1,4 +1,4 @@
-"""What became of the venue while its frames arrived."""
+"""Submissions whose venue was changed while their frames arrived."""
 
 from datetime import UTC, datetime
 from io import BytesIO
@@ -13,13 +13,14 @@ from service.routes.submissions.job_submission import Sender
 from service.schemas.geometry import Pose
 from service.schemas.options import Options
 from service.schemas.problems import Problem
+from service.schemas.source_urls import SourceSecrets
 from service.schemas.venue import VenueIn
 from service.settings import Settings
 from service.store.jobs.queries import JobPage
-from service.store.jobs.submission import VenueBusy
 from service.store.jobs.task import Origin
 from tests.e2e.running import png, venue
 from tests.homes import files, in_both_homes
+from tests.problems import refused
 
 pytestmark = in_both_homes
 
@@ -37,7 +38,7 @@ def context(home, tmp_path):
 def read(context):
     """The venue as it was before the upload."""
     stored = VenueIn.model_validate(venue("v")).to_venue()
-    context.venues.put(stored, lambda _: None)
+    context.venues.put(stored)
     return stored
 
 
@@ -50,7 +51,7 @@ def uploaded():
     return FormData([(camera, UploadFile(BytesIO(png()), filename="f")) for camera in ("left", "right")])
 
 
-def refused(context, read, form):
+def refused_members(context, read, form):
     with pytest.raises(Problem) as problem:
         frames.submit(context, read, form, Options, Sender(None, Origin()))
     assert files(context.settings.home_blob_url) == []
@@ -59,15 +60,15 @@ def refused(context, read, form):
 
 def test_a_job_begins_from_the_poses_that_were_found_during_the_upload(context, read, form):
     moved = Pose.from_position(read.cameras[0].pose.rotation, [0.0, -60.0, 9.0])
-    context.venues.put(read.with_poses({"left": moved}), lambda _: None)
+    context.venues.put(read.with_poses({"left": moved}))
     assert frames.submit(context, read, form, Options, Sender(None, Origin())).status_code == 202
     (job,) = context.jobs.page(JobPage(10, venue="v")).jobs
     assert context.attempts.begin(job.id).venue == context.venues.get("v")
 
 
 def test_frames_of_a_venue_that_was_deleted_during_the_upload_are_refused(context, read, form):
-    context.venues.delete("v", lambda *_: None)
-    problem = refused(context, read, form)
+    context.venues.delete("v")
+    problem = refused_members(context, read, form)
     assert (problem["status"], problem["type"]) == (404, "/problems/venue-not-found")
 
 
@@ -78,8 +79,8 @@ def test_frames_that_were_checked_against_another_venue_are_to_be_sent_again(con
         document["field"]["length_m"] = 100
     if part == "lens":
         document["cameras"][0]["intrinsics"]["matrix"][0][0] = 61
-    context.venues.put(VenueIn.model_validate(document).to_venue(), lambda _: None)
-    problem = refused(context, read, form)
+    context.venues.put(VenueIn.model_validate(document).to_venue())
+    problem = refused_members(context, read, form)
     assert (problem["status"], problem["type"]) == (409, "/problems/venue-replaced")
     assert "send again" in problem["detail"]
 
@@ -102,7 +103,7 @@ def test_frames_are_on_the_list_of_what_goes_until_they_are_a_job(context, read,
 
 
 def left(context):
-    """What is on the list of what goes, now or later."""
+    """Folders on the list of pending deletions."""
     return context.expiry.leftovers(datetime.now(UTC) + 2 * submit.UPLOAD_GRACE, 10)
 
 
@@ -118,7 +119,7 @@ def test_a_full_queue_refuses_before_anything_is_stored(context, read, form, mon
 def test_a_queue_that_fills_meanwhile_leaves_nothing_on_the_list(context, read, form, monkeypatch):
     context.settings.queue_limit = 0
     monkeypatch.setattr(context.intake, "require_place", lambda _: None)
-    assert refused(context, read, form)["type"] == "/problems/queue-full"
+    assert refused_members(context, read, form)["type"] == "/problems/queue-full"
     assert left(context) == []
 
 
@@ -154,14 +155,14 @@ def test_frames_that_are_submitted_again_are_copied_by_the_store(context, read, 
 def test_a_frame_that_is_too_large_is_refused_before_any_is_read(context, read):
     # There is nothing to read in them.
     files = {"left": [UploadFile(None, size=1)], "right": [UploadFile(None, size=244_000_000)]}
-    with pytest.raises(Problem) as refused:
+    with pytest.raises(Problem) as problem:
         job_submission.submit_files(context, read, Options(), files, Sender(None, Origin()))
-    assert (refused.value.kind, refused.value.parts) == ("frame-too-large", {"camera": "right"})
+    assert (problem.value.kind, problem.value.parts) == ("frame-too-large", {"camera": "right"})
 
 
 def test_frames_that_were_fetched_once_are_not_what_the_cameras_show_now(context, read, monkeypatch):
     sources = [camera.model_copy(update={"source": f"http://127.0.0.1/{camera.id}"}) for camera in read.cameras]
-    context.venues.put(read.model_copy(update={"cameras": sources}), lambda _: None)
+    context.venues.put(read.model_copy(update={"cameras": sources}))
     monkeypatch.setattr(
         context.snapshots, "take_of_all", lambda cameras, *_: {camera.id: [png()] for camera in cameras}
     )
@@ -174,9 +175,9 @@ def test_frames_that_were_fetched_once_are_not_what_the_cameras_show_now(context
     context.decisions.cancel(first.id)
     old = context.jobs.get(first.id)
     assert [resubmit.submit(context, old, Origin()).status_code for _ in range(2)] == [202, 200]
-    with pytest.raises(VenueBusy):
+    with refused("venue-busy"):
         fetched()
-    with pytest.raises(VenueBusy):
+    with refused("venue-busy"):
         fetched("schedule-1")
     # Once more of the same frames is the job that computes them.
     (second, _) = context.jobs.page(JobPage(10, venue="v")).jobs
@@ -186,8 +187,8 @@ def test_frames_that_were_fetched_once_are_not_what_the_cameras_show_now(context
 def test_a_password_goes_to_the_source_that_it_was_put_with(context, read, monkeypatch):
     def put(host):
         sources = [camera.model_copy(update={"source": f"http://***@{host}/x"}) for camera in read.cameras]
-        passwords = {camera.id: f"user:of-{host}" for camera in read.cameras}
-        context.venues.put(read.model_copy(update={"cameras": sources}), lambda _: None, lambda *_: passwords)
+        passwords = {camera.id: SourceSecrets(f"user:of-{host}") for camera in read.cameras}
+        context.venues.put(read.model_copy(update={"cameras": sources}), passwords)
 
     put("old")
     stale = context.venues.get("v")

@@ -88,7 +88,7 @@ def test_a_venue_has_the_stitch_error_of_the_poses_that_hold(stock):
     assert time.time() - 60 < accepted <= time.time() + 1
     assert ("esc_venue_accepted_timestamp_seconds", ("venue", "kept")) not in found
     assert found["esc_venue_moved_pixels", ("venue", "kept")] == 1.0
-    stock.venues.delete("kept", lambda *_: None)
+    stock.venues.delete("kept")
     assert ("esc_venue_stitch_error_pixels", ("venue", "kept")) not in figures(stock)
 
 

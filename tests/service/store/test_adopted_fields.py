@@ -5,12 +5,11 @@ import pytest
 
 from service.schemas.field import FieldOfPlay
 from service.schemas.results import AdoptableNumber
-from service.store.adopted_fields import NoSuchJob, NotAdoptable, NumberRefused
-from service.store.jobs.decisions import VenueHasChanged
 from service.store.memories import newest_memories
 from tests.homes import in_both_homes
+from tests.problems import refused
 from tests.service.store.test_refined import refined
-from tests.worker.stock import anyway, result
+from tests.worker.stock import result
 from worker.calibration.geometry.field import Field
 from worker.jobs.from_schemas import pitch_of
 
@@ -32,11 +31,11 @@ def night(stock, *numbers, accepted=True, **options):
 
 def adopted(stock, job, name="ridge_height_m"):
     """The field after a number was stored."""
-    return stock.adopted_fields.adopt("v", job, name, anyway).field
+    return stock.adoption.adopt_number("v", job, name).field
 
 
 def offered(stock, job):
-    return list(stock.adopted_fields.adoptable(job))
+    return list(stock.adoption.adoptable_numbers(job))
 
 
 def newest(stock):
@@ -76,7 +75,7 @@ def test_memories_and_trends_end_with_it_as_with_any_other_field_that_is_put(sto
     with stock.engine.connect() as connection:
         assert newest_memories(connection, "v") == {}
     assert stock.trends.of(stock.venues.get("v"), "left").anchor is None
-    assert stock.refined.of_venue(stock.venues.get("v")) == {}
+    assert stock.adoption.refined_of_venue(stock.venues.get("v")) == {}
 
 
 def test_to_store_it_again_changes_nothing(stock):
@@ -106,12 +105,12 @@ def test_restoring_the_revision_before_takes_a_length_back_and_the_one_after_bri
     job = night(stock, LENGTH)
     adopted(stock, job, "length_m")
     assert length(stock) == 104.6
-    stock.venues.restore("v", 2, anyway)
+    stock.venues.restore("v", 2)
     assert (length(stock), newest(stock).cause, newest(stock).restored_from) == (105.0, "restored", 2)
     assert offered(stock, job) == ["length_m"]
-    stock.venues.restore("v", 3, anyway)
+    stock.venues.restore("v", 3)
     assert length(stock) == 104.6
-    stock.venues.restore("v", 1, anyway)
+    stock.venues.restore("v", 1)
     assert length(stock) == 105.0
     assert stock.venues.restorable(stock.venues.get("v"), [1, 2, 3, 4, 5]) == {1, 2, 3, 4, 5}
 
@@ -120,8 +119,8 @@ def test_a_length_that_somebody_has_put_since_is_not_taken_back(stock):
     venue = stock.venue("v")
     adopted(stock, night(stock, LENGTH), "length_m")
     measured = venue.field.model_copy(update={"length_m": 104.7})
-    stock.venues.put(stock.venues.get("v").model_copy(update={"field": measured}), anyway)
-    stock.venues.restore("v", 1, anyway)
+    stock.venues.put(stock.venues.get("v").model_copy(update={"field": measured}))
+    stock.venues.restore("v", 1)
     assert length(stock) == 104.7
 
 
@@ -132,12 +131,12 @@ def test_nothing_is_stored_of_a_job_whose_poses_do_not_hold(stock):
     second = night(stock, RIDGE, accepted=["left"])
     assert [offered(stock, job) for job in (rejected, dry, first)] == [[], [], []]
     for job in (rejected, dry, first):
-        with pytest.raises(VenueHasChanged) as moved:
+        with refused("venue-moved-on") as moved:
             adopted(stock, job)
-        assert moved.value.newest.job == second
+        assert moved.value.parts["got"] == 3
     assert offered(stock, second) == ["ridge_height_m"]
     stock.moved_by_hand("v", -3.0)
-    with pytest.raises(VenueHasChanged):
+    with refused("venue-moved-on"):
         adopted(stock, second)
     assert stock.venues.get("v").field.ridge is None
 
@@ -149,10 +148,10 @@ def test_poses_that_a_person_accepted_or_restored_hold_too_and_so_do_refined_one
     assert offered(stock, by_hand) == ["ridge_height_m"]
     night(stock)
     assert offered(stock, by_hand) == []
-    stock.venues.restore("v", 2, anyway)
+    stock.venues.restore("v", 2)
     assert offered(stock, by_hand) == ["ridge_height_m"]
     last = night(stock, RIDGE)
-    stock.refined.adopt("v", "left", anyway)
+    stock.adoption.adopt_refined("v", "left")
     assert adopted(stock, last).ridge == HIPPED
 
 
@@ -160,21 +159,21 @@ def test_on_a_field_that_was_put_since_nothing_is_offered(stock):
     venue = stock.venue("v")
     job = night(stock, RIDGE)
     wider = venue.field.model_copy(update={"width_m": 69.0})
-    stock.venues.put(stock.venues.get("v").model_copy(update={"field": wider}), anyway)
+    stock.venues.put(stock.venues.get("v").model_copy(update={"field": wider}))
     assert offered(stock, job) == []
-    with pytest.raises(VenueHasChanged):
+    with refused("venue-moved-on"):
         adopted(stock, job)
 
 
 def test_a_number_that_the_sport_does_not_allow_is_refused_with_its_limits(stock):
     stock.venue("v")
     job = night(stock, ("length_m", 105.0, 131.5), ("ridge_height_m", 0.0, -0.1))
-    refused = {name: one.refused_because for name, one in stock.adopted_fields.adoptable(job).items()}
-    assert refused == {
+    reasons = {name: one.refused_because for name, one in stock.adoption.adoptable_numbers(job).items()}
+    assert reasons == {
         "length_m": "football: 60 to 130 m, not 131.5",
         "ridge_height_m": "the ridge must be 0 to 3 m high, not -0.1 m",
     }
-    with pytest.raises(NumberRefused, match="60 to 130 m"):
+    with refused("field-number-refused", "60 to 130 m"):
         adopted(stock, job, "length_m")
     assert newest(stock).revision == 2
 
@@ -182,11 +181,11 @@ def test_a_number_that_the_sport_does_not_allow_is_refused_with_its_limits(stock
 def test_what_a_job_does_not_offer_and_jobs_of_other_venues_are_refused(stock):
     stock.venue("v")
     stock.venue("w")
-    with pytest.raises(NotAdoptable) as refused:
+    with refused("field-number-not-found") as problem:
         adopted(stock, night(stock, RIDGE), "width_m")
-    assert refused.value.offered == ["ridge_height_m"]
+    assert problem.value.parts["expected"] == ["ridge_height_m"]
     for job in (stock.calibrated("w"), "01KAJ3Q6WZ5T3Y8R0N4M2C7B1D"):
-        with pytest.raises(NoSuchJob):
+        with refused("job-not-found"):
             adopted(stock, job)
         assert offered(stock, job) == []
 

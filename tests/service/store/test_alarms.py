@@ -4,7 +4,6 @@ from service.schemas.health import Alarms as Rules
 from service.schemas.job import JobError
 from service.store.statistics.snapshot import read_statistics
 from tests.homes import in_both_homes
-from tests.worker.stock import anyway
 from worker.duties.alarms import AlarmTimer
 
 URL = "https://example.com/alarms"
@@ -13,7 +12,7 @@ ERROR = JobError(type="/problems/no-markings-in-view", title="", detail="")
 
 def watched(stock, **rules):
     venue = stock.venue("v")
-    stock.venues.put(venue.model_copy(update={"alarms": Rules(callback_url=URL, **rules)}), anyway)
+    stock.venues.put(venue.model_copy(update={"alarms": Rules(callback_url=URL, **rules)}))
 
 
 def told(stock):
@@ -84,7 +83,7 @@ def test_drift_adds_up_until_it_rings_and_restoring_ends_it(stock):
         stock.calibrated("v")
         assert bool(rings(stock)) == rung
     assert told(stock) == [("moved-since-first", "began")] * 2
-    stock.venues.restore("v", 2, anyway)
+    stock.venues.restore("v", 2)
     assert rings(stock) == []
     assert told(stock)[2:] == [("moved-since-first", "ended")] * 2
 
@@ -141,7 +140,7 @@ def test_a_rule_that_is_taken_away_ends_its_alarm(stock):
 def test_alarms_go_with_their_venue(stock):
     watched(stock, rejected_in_a_row=1)
     stock.calibrated("v", accepted=False)
-    stock.venues.delete("v", lambda *_: None)
+    stock.venues.delete("v")
     stock.venue("v")
     assert (rings(stock), stock.venues.health("v").rejected_in_a_row) == ([], 0)
 

@@ -1,9 +1,8 @@
 """What can still be decided about a calibration is what is then not refused."""
 
-import pytest
-
-from service.store.jobs.decisions import OpenDecisions, VenueHasChanged
+from service.store.jobs.decisions import OpenDecisions
 from tests.homes import in_both_homes
+from tests.problems import refused
 
 BOTH = frozenset({"left", "right"})
 NOTHING = OpenDecisions(frozenset(), reject=False)
@@ -34,7 +33,7 @@ def test_nothing_can_be_decided_about_a_venue_that_somebody_changed_since(stock)
     stock.moved_by_hand("v", -3.0)
     assert stock.decisions.decidable(job) == OpenDecisions(frozenset(), reject=False, is_outdated=True)
     for decide in (stock.decisions.accept, stock.decisions.reject):
-        with pytest.raises(VenueHasChanged):
+        with refused("venue-moved-on"):
             decide(job)
 
 
@@ -44,5 +43,5 @@ def test_nothing_can_be_decided_about_a_job_without_poses_or_without_its_venue(s
     assert stock.decisions.decidable(waiting) == NOTHING
     stock.decisions.cancel(waiting)
     job = stock.calibrated("v")
-    stock.venues.delete("v", lambda *_: None)
+    stock.venues.delete("v")
     assert stock.decisions.decidable(job) == NOTHING

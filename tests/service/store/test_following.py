@@ -9,7 +9,7 @@ from service.schemas.events.webhooks import Webhook
 from service.schemas.job import JobError
 from service.store import tables
 from tests.homes import in_both_homes
-from tests.worker.stock import Stock, anyway
+from tests.worker.stock import Stock
 
 
 def told(stock, venue="v", seen=0, kinds=()):
@@ -20,11 +20,11 @@ def told(stock, venue="v", seen=0, kinds=()):
 @in_both_homes
 def test_everything_that_happens_to_a_venue_is_an_event_in_its_order(stock):
     job = stock.calibrated("v")
-    stock.venues.put(stock.venue("v").model_copy(update={"name": "Ground 2"}), anyway)
+    stock.venues.put(stock.venue("v").model_copy(update={"name": "Ground 2"}))
     failed = stock.submitted("v")
     stock.attempts.fail(stock.attempts.begin(failed), JobError(type="/problems/job-crashed", title="", detail=""))
     stock.decisions.cancel(stock.submitted("v"))
-    stock.venues.delete("v", lambda *_: None)
+    stock.venues.delete("v")
     page = stock.events.since("v", 0, [], 100)
     assert [one.event.type for one in page.events] == [
         "venue.created",
@@ -127,7 +127,7 @@ def test_who_follows_misses_no_event_of_transactions_that_run_at_once(stock):
             found.extend(one.number for one in page.events)
 
     def rename(n: int) -> None:
-        stock.venues.change("v", lambda venue, known: (venue.model_copy(update={"name": f"{n}"}), known))
+        stock.venues.patch("v", lambda venue: (venue.model_copy(update={"name": f"{n}"}), {}))
 
     with ThreadPoolExecutor(5) as pool:
         following = pool.submit(follow)
@@ -141,7 +141,7 @@ def test_who_follows_misses_no_event_of_transactions_that_run_at_once(stock):
 def test_webhooks_are_told_what_they_want(stock):
     wants = {"https://a.example/": ["poses.changed"], "https://b.example/": ["job.*", "alarm.*"]}
     webhooks = [Webhook(url=url, events=events) for url, events in wants.items()]
-    stock.venues.put(stock.venue("v").model_copy(update={"webhooks": webhooks}), anyway)
+    stock.venues.put(stock.venue("v").model_copy(update={"webhooks": webhooks}))
     stock.calibrated("v")
     d = tables.deliveries.c
     with stock.engine.connect() as connection:

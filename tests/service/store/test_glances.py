@@ -8,7 +8,6 @@ from service.pages.venues import venue_rows
 from service.schemas.health import Alarms
 from service.store.statistics.venue_summary import IN_CURVE
 from tests.homes import in_both_homes
-from tests.worker.stock import anyway
 
 
 def glance(stock, venue="v"):
@@ -37,10 +36,9 @@ def test_a_curve_has_an_end(stock):
     assert len(glance(stock).errors) == IN_CURVE
 
 
-def test_the_end_of_a_job_whose_venue_was_deleted_is_shown_nowhere(stock):
-    job = stock.submitted("v")
-    stock.venues.delete("v", lambda *_: None)
-    stock.decisions.cancel(job)
+def test_a_job_whose_venue_was_deleted_is_shown_nowhere(stock):
+    stock.decisions.cancel(stock.submitted("v"))
+    stock.venues.delete("v")
     assert glance(stock) is None
 
 
@@ -48,7 +46,7 @@ def test_the_end_of_a_job_whose_venue_was_deleted_is_shown_nowhere(stock):
 def test_the_list_asks_as_often_for_many_venues_as_for_one(stock):
     rules = Alarms(rejected_in_a_row=1)
     for name in ("v", "w", "x"):
-        stock.venues.put(stock.venue(name).model_copy(update={"alarms": rules}), anyway)
+        stock.venues.put(stock.venue(name).model_copy(update={"alarms": rules}))
         stock.calibrated(name, accepted=name == "w")
     active = stock.submitted("w")
     venues = stock.venues.page(None, 10).venues

@@ -10,7 +10,6 @@ from service.schemas.live import LiveReport, LiveState
 from service.store import tables
 from service.store.statistics.snapshot import read_statistics
 from tests.homes import in_both_homes
-from tests.worker.stock import anyway
 from worker.duties.alarms import AlarmTimer
 from worker.duties.retention import Retention
 
@@ -38,7 +37,7 @@ def report(*cameras, **more):
 
 
 def told(stock, *cameras, **more):
-    stock.live.report("v", report(*(cameras or [camera()]), **more), anyway)
+    stock.live.report("v", report(*(cameras or [camera()]), **more))
 
 
 def time_passes(stock, **time):
@@ -70,7 +69,7 @@ def rings(stock):
 @pytest.fixture
 def watched(stock):
     venue = stock.venue("v")
-    stock.venues.put(venue.model_copy(update={"alarms": Rules(live=True)}), anyway)
+    stock.venues.put(venue.model_copy(update={"alarms": Rules(live=True)}))
     return stock
 
 
@@ -109,13 +108,9 @@ def test_reports_add_up_by_the_minute_with_the_worst_of_each_and_go_after_a_week
 def test_what_was_reported_of_a_venue_goes_with_it(stock):
     stock.venue("v")
     told(stock)
-    stock.venues.delete("v", anyway_of_two)
+    stock.venues.delete("v")
     assert stock.live.newest(["v"]) == {}
     assert stock.live.history("v", 60) == []
-
-
-def anyway_of_two(*_):
-    """Allow it."""
 
 
 def test_a_tracked_camera_that_is_not_measured_rings_after_ten_seconds_until_it_is(watched):

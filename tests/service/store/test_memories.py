@@ -9,7 +9,7 @@ from service.schemas.geometry import Intrinsics
 from service.store import tables
 from service.store.memories import KEPT, LARGEST_BYTES, newest_memories
 from tests.homes import in_both_homes
-from tests.worker.stock import anyway, result
+from tests.worker.stock import result
 
 pytestmark = pytest.mark.slow
 
@@ -75,7 +75,7 @@ def test_another_name_or_a_better_known_lens_changes_no_memory(stock):
     venue = stock.venue("v")
     known = venue.cameras[0].intrinsics.model_copy(update={"sigma": {"fx": 0.1}})
     cameras = [venue.cameras[0].model_copy(update={"intrinsics": known}), *venue.cameras[1:]]
-    stock.venues.put(venue.model_copy(update={"name": "renamed", "cameras": cameras}), anyway)
+    stock.venues.put(venue.model_copy(update={"name": "renamed", "cameras": cameras}))
     assert remembered(stock) == {"left": 1, "right": 1}
 
 
@@ -84,10 +84,10 @@ def test_on_another_field_all_cameras_begin_anew_and_no_undoing_brings_the_night
     stock.venue("v")
     night(stock, 1)
     venue = stock.venue("v")
-    stock.venues.put(venue.model_copy(update={"field": FieldOfPlay(length_m=104, width_m=68)}), anyway)
+    stock.venues.put(venue.model_copy(update={"field": FieldOfPlay(length_m=104, width_m=68)}))
     assert (remembered(stock), rows(stock)) == ({}, 0)
     night(stock, 2)
-    stock.venues.restore("v", 2, anyway)
+    stock.venues.restore("v", 2)
     assert remembered(stock) == {}
 
 
@@ -98,9 +98,9 @@ def test_undoing_a_job_takes_its_night_back(stock):
     stock.decisions.reject(undone)
     assert remembered(stock) == {"left": 1, "right": 1}
     # And so does going back to any revision; before the first job there were none.
-    stock.venues.restore("v", 3, anyway)
+    stock.venues.restore("v", 3)
     assert remembered(stock) == {"left": 2, "right": 2}
-    stock.venues.restore("v", 1, anyway)
+    stock.venues.restore("v", 1)
     assert remembered(stock) == {}
 
 
@@ -125,7 +125,7 @@ def test_the_memories_of_the_last_few_revisions_are_kept(stock):
     for number in range(1, KEPT + 3):
         night(stock, number)
     assert (rows(stock), remembered(stock)) == (KEPT, {"left": KEPT + 2, "right": KEPT + 2})
-    stock.venues.restore("v", 2, anyway)
+    stock.venues.restore("v", 2)
     assert remembered(stock) == {}
 
 
@@ -143,7 +143,7 @@ def test_memories_that_are_too_large_are_dropped_with_the_old_ones_and_logged(st
 def test_a_deleted_venue_leaves_no_memories(stock):
     stock.venue("v")
     night(stock, 1)
-    stock.venues.delete("v", lambda _, __: None)
+    stock.venues.delete("v")
     assert rows(stock) == 0
 
 

@@ -4,11 +4,11 @@ import pytest
 
 from service.schemas.geometry import Light
 from service.schemas.results import View
-from service.store.jobs.decisions import VenueHasChanged
 from service.store.statistics.snapshot import read_statistics
 from tests.homes import in_both_homes
+from tests.problems import refused
 from tests.service.store.test_alarms import failed, rings, told, watched
-from tests.worker.stock import anyway, result
+from tests.worker.stock import result
 
 
 def standing(stock):
@@ -99,9 +99,9 @@ def test_the_rest_is_not_taken_once_something_else_has_come(stock):
     stock.venue("v")
     job = partly(stock)
     stock.moved_by_hand("v", -3.0)
-    with pytest.raises(VenueHasChanged):
+    with refused("venue-moved-on"):
         stock.decisions.accept(job)
-    stock.venues.restore("v", 2, anyway)
+    stock.venues.restore("v", 2)
     assert standing(stock) == LEFT_MOVED
 
 

@@ -1,6 +1,5 @@
 """Refined poses and lenses in the results of jobs: to whom they belong, and how they are stored."""
 
-import pytest
 import sqlalchemy as sa
 
 from service.schemas.field import FieldOfPlay
@@ -8,9 +7,9 @@ from service.schemas.geometry import Intrinsics, Pose
 from service.schemas.results import Refined
 from service.store import tables
 from service.store.memories import newest_memories
-from service.store.refined import NoRefinedPose
 from tests.homes import in_both_homes
-from tests.worker.stock import anyway, result
+from tests.problems import refused
+from tests.worker.stock import result
 
 LENS = Intrinsics(matrix=[[60.06, 0, 32], [0, 60.06, 24], [0, 0, 1]], distortion=[0, 0, 0, 0], sigma={"fx": 0.01})
 
@@ -33,7 +32,7 @@ def refined(pose):
 
 def along(stock):
     """Where along the pitch the refined poses of the venue are, by camera."""
-    found = stock.refined.of_venue(stock.venues.get("v"))
+    found = stock.adoption.refined_of_venue(stock.venues.get("v"))
     return {camera: round(one.pose.position[0], 6) for camera, one in found.items()}
 
 
@@ -55,9 +54,9 @@ def test_a_restored_pose_has_that_of_its_own_job(stock):
     stock.venue("v")
     night(stock)
     night(stock)
-    stock.venues.restore("v", 2, anyway)
+    stock.venues.restore("v", 2)
     assert along(stock) == {"left": -0.999, "right": -0.999}
-    stock.venues.restore("v", 1, anyway)
+    stock.venues.restore("v", 1)
     assert along(stock) == {}
 
 
@@ -67,7 +66,7 @@ def test_a_camera_that_was_put_since_has_none_and_on_another_field_nobody_has(st
     stock.moved_by_hand("v", -3.0)
     assert along(stock) == {"right": -0.999}
     other = stock.venue("v").model_copy(update={"field": FieldOfPlay(length_m=104, width_m=68)})
-    stock.venues.put(other, anyway)
+    stock.venues.put(other)
     assert along(stock) == {}
 
 
@@ -81,7 +80,7 @@ def test_a_refused_pose_that_is_accepted_by_hand_has_none(stock):
 def test_to_store_one_is_a_revision_that_keeps_the_memories_and_what_is_known_of_the_lens(stock):
     stock.venue("v")
     job = night(stock)
-    adopted = stock.refined.adopt("v", "left", anyway)
+    adopted = stock.adoption.adopt_refined("v", "left")
     assert adopted == stock.venues.get("v")
     left, right = adopted.cameras
     assert (left.pose.position[2], left.intrinsics) == (8.01, LENS.model_copy(update={"sigma": None}))
@@ -93,17 +92,17 @@ def test_to_store_one_is_a_revision_that_keeps_the_memories_and_what_is_known_of
     with stock.engine.connect() as connection:
         assert newest_memories(connection, "v") == {"left": {"jobs": 1}, "right": {"jobs": 1}}
     # It is still that of the job, and to store it again changes nothing.
-    assert stock.refined.adopt("v", "left", anyway) == adopted
+    assert stock.adoption.adopt_refined("v", "left") == adopted
     assert len(stock.venues.history("v", None, 9)) == 3
-    stock.refined.adopt("v", "right", anyway)
+    stock.adoption.adopt_refined("v", "right")
     assert along(stock) == {"left": -0.999, "right": -0.999}
 
 
 def test_a_camera_without_one_is_refused_and_nothing_is_written(stock):
     stock.venue("v")
     stock.calibrated("v")
-    with pytest.raises(NoRefinedPose):
-        stock.refined.adopt("v", "left", anyway)
+    with refused("refined-not-found"):
+        stock.adoption.adopt_refined("v", "left")
     assert len(stock.venues.history("v", None, 9)) == 2
 
 
@@ -111,7 +110,7 @@ def test_a_calibration_that_runs_meanwhile_is_rejected(stock):
     stock.venue("v")
     night(stock)
     running = stock.attempts.begin(stock.submitted("v"))
-    stock.refined.adopt("v", "left", anyway)
+    stock.adoption.adopt_refined("v", "left")
     stock.attempts.finish(running, result(running.venue, True), [])
     assert stock.jobs.get(running.job_id).result.rejected_because == "the venue was changed while the job ran"
 

@@ -16,21 +16,20 @@ from service.schemas.venue import VENUE_EXAMPLE, VenueIn
 from service.store import tables
 from service.store.blobs import Blobs
 from service.store.ids import new_id
+from service.store.preconditions import Precondition
 from service.store.venues import VenueRepository
 from service.store.workers import WorkerRepository
 from tests.homes import in_both_homes, on_servers
-from tests.worker.stock import anyway, result
+from tests.problems import refused
+from tests.worker.stock import result
 
 
 @in_both_homes
 def test_a_refused_put_changes_nothing(engine):
     venues = VenueRepository(engine)
 
-    def refuse(_):
-        raise PermissionError
-
-    with pytest.raises(PermissionError):
-        venues.put(VenueIn.model_validate(VENUE_EXAMPLE).to_venue(), refuse)
+    with refused("venue-changed"):
+        venues.put(VenueIn.model_validate(VENUE_EXAMPLE).to_venue(), precondition=Precondition('"seen"'))
     assert venues.get("tsukuba") is None
 
 
@@ -181,7 +180,7 @@ def test_a_job_is_handed_out_with_what_the_frames_of_the_last_accepted_one_were_
 @in_both_homes
 def test_the_end_of_a_job_reads_and_writes_what_is_known_of_its_venue_once(stock):
     venue = stock.venue("v")
-    stock.venues.put(venue.model_copy(update={"alarms": Rules(moved_since_last_px=0.001)}), anyway)
+    stock.venues.put(venue.model_copy(update={"alarms": Rules(moved_since_last_px=0.001)}))
     stock.calibrated("v")
     task, statements = stock.attempts.begin(stock.submitted("v")), []
 

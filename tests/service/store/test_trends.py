@@ -9,7 +9,6 @@ from service.schemas.health import Alarms
 from service.store import tables, trends
 from tests.homes import in_both_homes
 from tests.trending import SIGMA_M, displacement, night, nights, noisy
-from tests.worker.stock import anyway
 
 pytestmark = pytest.mark.slow
 
@@ -82,7 +81,7 @@ def test_a_result_that_a_person_accepts_is_the_new_anchor(stock):
 
 def test_a_person_who_accepts_what_holds_already_says_that_the_camera_is_right_there(stock):
     venue = stock.venue("v")
-    stock.venues.put(venue.model_copy(update={"alarms": Alarms(trend_m=0.03)}), anyway)
+    stock.venues.put(venue.model_copy(update={"alarms": Alarms(trend_m=0.03)}))
     nights(stock, 40, AUTUMN, noisy(1, lambda number: 0.045 if number >= 30 else 0.0))
     assert len(stock.venues.health("v").alarms) == 2
     for _ in range(2):
@@ -103,9 +102,9 @@ def test_restoring_takes_the_trend_back_to_what_it_was_then(stock):
     nights(stock, 3, AUTUMN, lambda number: displacement(0.01 * number))
     stock.moved_by_hand("v", -3.0)
     night(stock, displacement(0.0))
-    stock.venues.restore("v", 3, anyway)
+    stock.venues.restore("v", 3)
     assert moved_m(stock) == [0.0, 0.01]
-    stock.venues.restore("v", 1, anyway)
+    stock.venues.restore("v", 1)
     assert trend(stock).points == []
     assert stock.attempts.begin(stock.submitted("v")).anchors == {}
 
@@ -147,7 +146,7 @@ def test_a_quiet_camera_is_said_to_be_quiet(stock):
 
 def test_a_step_is_told_with_its_size_and_its_day_and_rings_where_it_matters(stock):
     venue = stock.venue("v")
-    stock.venues.put(venue.model_copy(update={"alarms": Alarms(trend_m=0.03)}), anyway)
+    stock.venues.put(venue.model_copy(update={"alarms": Alarms(trend_m=0.03)}))
     nights(stock, 40, AUTUMN, noisy(1, lambda number: 0.045 if number >= 30 else 0.0))
     found = trend(stock)
     assert found.state == "alarm"
@@ -162,7 +161,7 @@ def test_a_step_is_told_with_its_size_and_its_day_and_rings_where_it_matters(sto
 
 def test_a_shift_that_is_sure_but_small_drifts_and_rings_nothing(stock):
     venue = stock.venue("v")
-    stock.venues.put(venue.model_copy(update={"alarms": Alarms(trend_m=0.2)}), anyway)
+    stock.venues.put(venue.model_copy(update={"alarms": Alarms(trend_m=0.2)}))
     nights(stock, 40, AUTUMN, noisy(1, lambda number: 0.045 if number >= 30 else 0.0))
     assert trend(stock).state == "drifting"
     assert stock.venues.health("v").alarms == []
@@ -219,7 +218,7 @@ def test_nights_before_a_moment_are_left_out_and_charted_all_the_same(stock):
 def test_a_trend_goes_with_its_camera_and_with_its_venue(stock):
     nights(stock, 2, AUTUMN, lambda _: displacement(0.01))
     venue = stock.venue("v")
-    stock.venues.put(venue.model_copy(update={"cameras": venue.cameras[:1]}), anyway)
+    stock.venues.put(venue.model_copy(update={"cameras": venue.cameras[:1]}))
     assert rows(stock) == 2
-    stock.venues.delete("v", lambda *_: None)
+    stock.venues.delete("v")
     assert rows(stock) == 0

@@ -5,12 +5,14 @@ from functools import partial
 import pytest
 import sqlalchemy as sa
 
+from service.schemas.addresses import HIDDEN
+from service.schemas.source_urls import SourceSecrets
 from service.store import tables, unreadable
 from service.store.unreadable import UnreadableRow
 from tests.e2e.running import venue
 from tests.homes import in_both_homes
-from tests.service.serving_in_process import InProcess
-from tests.worker.stock import anyway, result
+from tests.service.local_service import LocalService
+from tests.worker.stock import result
 from worker.duties.alarms import AlarmTimer
 
 SUNKEN = [[-18.5, 0.0, -0.001], [18.5, 0.0, -0.001]]
@@ -21,9 +23,8 @@ WATCHED = {"alarms": {"not_calibrated_for_h": 1}}
 def service(stock, monkeypatch):
     # Other tests of this process have met rows of theirs.
     monkeypatch.setattr(unreadable, "_met", {})
-    service = InProcess(stock.settings)
-    yield service
-    service.close()
+    with LocalService(stock.settings) as service:
+        yield service
 
 
 @pytest.fixture
@@ -122,12 +123,13 @@ def test_a_put_of_it_goes_by_its_conditions_and_knows_its_passwords(stock, servi
     assert service.ask("PUT", broken, json=venue("broken"), headers={"If-None-Match": "*"}).status_code == 412
     with pytest.raises(UnreadableRow):
         stock.venues.get("broken")
-    good, before = stock.venue("good"), []
-    anew = good.model_copy(update={"id": "broken"})
-    stock.venues.put(anew, anyway, lambda known, _: before.append(known) or {"left": "user:secret"})
+    good = stock.venue("good")
+    left = good.cameras[0].model_copy(update={"source": "http://***@10.0.0.7/left.jpg"})
+    anew = good.model_copy(update={"id": "broken", "cameras": [left, *good.cameras[1:]]})
+    stock.venues.put(anew, {"left": SourceSecrets("user:secret")})
     overwrite(stock, tables.venues, "broken", sunken)
-    stock.venues.put(anew, anyway, lambda known, secrets: before.append((known, secrets)) or secrets)
-    assert before[1] == (anew, {"left": "user:secret"})
+    stock.venues.put(anew, {"left": SourceSecrets(HIDDEN)})
+    assert stock.venues.with_credentials("broken") == (anew, {"left": "user:secret"})
 
 
 @in_both_homes

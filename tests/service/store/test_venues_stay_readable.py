@@ -19,7 +19,7 @@ from hypothesis.stateful import (
 from service.schemas.job import JobError
 from tests.e2e.running import venue
 from tests.homes import in_both_homes
-from tests.service.serving_in_process import InProcess
+from tests.service.local_service import LocalService
 from tests.worker.stock import result
 from worker.protocol import Message
 from worker.result_checks import fault_in
@@ -146,7 +146,6 @@ class Venues(RuleBasedStateMachine):
 
 @in_both_homes
 def test_a_venue_stays_readable(stock):
-    service = InProcess(stock.settings)
     stays = settings(
         max_examples=12,
         stateful_step_count=12,
@@ -154,5 +153,5 @@ def test_a_venue_stays_readable(stock):
         derandomize=True,
         print_blob=False,
     )
-    run_state_machine_as_test(lambda: Venues(stock, service), settings=stays)
-    service.close()
+    with LocalService(stock.settings) as service:
+        run_state_machine_as_test(lambda: Venues(stock, service), settings=stays)

@@ -11,7 +11,6 @@ import pytest
 from service.schemas.health import Alarms as Rules
 from tests.worker.calibration.synthetic import CROWNED, moved, paint_frame
 from tests.worker.duties.year import VENUE, Frames, Year, cameras, fast_motion, frames_of, longer
-from tests.worker.stock import anyway
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.field import Field
 
@@ -103,7 +102,7 @@ def test_nights_add_up_and_go_on_when_the_refined_lens_is_stored(year, stock):
         # The lens is the one that it is said to be.
         assert abs(refined.longer) < 0.005
         assert refined.differs_m < 0.5
-    adopted = stock.refined.adopt(VENUE, "left", anyway)
+    adopted = stock.adoption.adopt_refined(VENUE, "left")
     assert adopted.cameras[0].pose == year.last.cameras[0].refined.pose
     year.pass_(1)
     assert year.day("the night after", year.frames())
@@ -183,11 +182,11 @@ def test_no_bad_pose_holds_on_any_day_of_a_year_and_every_alarm_sounds_once(year
 
     newest = stock.venues.history(VENUE, None, 1)[0].revision
     before = stock.venues.get(VENUE)
-    stock.venues.restore(VENUE, newest - 1, anyway)
+    stock.venues.restore(VENUE, newest - 1)
     assert stock.venues.get(VENUE) != before
-    stock.venues.restore(VENUE, newest, anyway)
+    stock.venues.restore(VENUE, newest)
     assert stock.venues.get(VENUE) == before
-    stock.venues.restore(VENUE, newest - 1, anyway)
+    stock.venues.restore(VENUE, newest - 1)
     year.pass_(1)
     assert year.day("from poses that were put back", year.frames())
 

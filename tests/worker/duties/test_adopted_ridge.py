@@ -5,7 +5,6 @@ import pytest
 
 from service.schemas.health import Alarms as Rules
 from tests.worker.duties.year import VENUE, Year, cameras, fast_motion, frames_of
-from tests.worker.stock import anyway
 
 pytestmark = pytest.mark.slow
 
@@ -24,7 +23,7 @@ def said_to_be_flat(stock):
     with fast_motion() as clock:
         year = Year(stock, clock, Rules())
         flat = year.venue.field.model_copy(update={"ridge": None})
-        stock.venues.put(year.venue.model_copy(update={"field": flat}), anyway)
+        stock.venues.put(year.venue.model_copy(update={"field": flat}))
         yield year
 
 
@@ -37,7 +36,7 @@ def test_the_ridge_is_offered_and_with_it_the_next_night_fits_better(said_to_be_
     assert (ridge.given, ridge.value) == (0.0, pytest.approx(0.35, abs=3 * ridge.sigma))
     # Nothing is stored by itself.
     assert year.venue.field.ridge is None
-    stock.adopted_fields.adopt(VENUE, year.job, "ridge_height_m", anyway)
+    stock.adoption.adopt_number(VENUE, year.job, "ridge_height_m")
     off_by_m = errors(year)
     after = year.calibrate(frames)
     assert after.accepted

@@ -13,7 +13,7 @@ from service.store.jobs.files import source_file
 from service.store.jobs.queries import JobPage
 from service.store.statistics import counters
 from tests.homes import in_both_homes
-from tests.worker.stock import Stock, anyway
+from tests.worker.stock import Stock
 from worker.duties.retention import AT_ONCE, FOLDERS_OF_A_JOB, TRY_AGAIN_AFTER, Retention
 
 pytestmark = [pytest.mark.slow, in_both_homes]
@@ -119,7 +119,7 @@ def test_the_last_accepted_job_of_each_venue_stays_with_its_pictures(stock, rete
 
 def test_nothing_of_a_deleted_venue_is_kept_for_ever(stock, retention):
     stock.ended("a", ago(days=500))
-    stock.venues.delete("a", lambda *_: None)
+    stock.venues.delete("a")
     retention.round(NOW)
     assert (stock.jobs.page(JobPage(10, venue="a")).jobs, stock.files()) == ([], set())
 
@@ -277,7 +277,7 @@ def test_a_full_disk_does_not_wait_for_the_next_round(home, tmp_path, forgotten)
 def test_poses_that_calibrations_brought_go_after_years_and_what_people_did_stays(stock, retention):
     for _ in range(4):
         stock.calibrated("a")
-    stock.venues.restore("a", 2, lambda _: None)
+    stock.venues.restore("a", 2)
     for _ in range(3):
         stock.calibrated("a")
     stock.calibrated("b")
@@ -322,7 +322,7 @@ def test_callbacks_that_were_not_delivered_expire_by_their_age_however_seldom_th
 def test_deliveries_of_events_expire_in_batches_and_leave_no_row(stock, retention, monkeypatch):
     monkeypatch.setattr("worker.duties.retention.EVENTS", 3)
     hook = Webhook(url="https://hangs.example/told", events=["poses.changed"])
-    stock.venues.put(stock.venue("v").model_copy(update={"webhooks": [hook]}), anyway)
+    stock.venues.put(stock.venue("v").model_copy(update={"webhooks": [hook]}))
     for _ in range(4):
         stock.calibrated("v")
     assert stock.callbacks() == {"waiting": 4}

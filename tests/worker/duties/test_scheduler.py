@@ -60,7 +60,7 @@ def put(home, name, options=None, alarms=None, source="http://127.0.0.1/x", **mo
     schedule = {"cron": "*/15 * * * *", "options": options} | more
     document = venue(name, cameras=("left",)) | {"schedule": schedule, "alarms": alarms}
     document["cameras"][0]["source"] = source
-    home.venues.put(VenueIn.model_validate(document).to_venue(), lambda _: None)
+    home.venues.put(VenueIn.model_validate(document).to_venue())
 
 
 def all_due(home, minutes=1):
@@ -253,7 +253,7 @@ def test_a_camera_that_is_slow_holds_up_no_other_venue(home_of_schedules, duty, 
 
     slow = home.venues.get("a-slow")
     cameras = [camera.model_copy(update={"source": "http://127.0.0.1/slow"}) for camera in slow.cameras]
-    home.venues.put(slow.model_copy(update={"cameras": cameras}), lambda _: None)
+    home.venues.put(slow.model_copy(update={"cameras": cameras}))
     monkeypatch.setattr(home.snapshots, "take_of_all", take)
     duty.poll()
     # What is being fired is due no earlier than in ten minutes.

@@ -20,7 +20,7 @@ from service.store.jobs.queries import JobPage
 from tests.homes import in_both_homes
 from tests.worker.certificates import certificate
 from tests.worker.receiver import TELLTALE, Dripping, Endless, Receiver, Silent, Talkative, Telltale
-from tests.worker.stock import Stock, anyway
+from tests.worker.stock import Stock
 from worker.duties import outbound_guard, webhook_request
 from worker.duties.webhook_delivery import AT_ONCE, ATTEMPT, WebhookDelivery
 
@@ -125,7 +125,7 @@ def test_every_end_is_told(stock, receiver, clock, how):
 def test_an_alarm_is_told_when_it_begins_and_when_it_is_over_and_nothing_is_left(stock, receiver, clock):
     home, hook = stock(), receiver(Receiver, 500, 204)
     rules = Alarms(rejected_in_a_row=1, callback_url=hook.url)
-    home.venues.put(home.venue("v").model_copy(update={"alarms": rules}), anyway)
+    home.venues.put(home.venue("v").model_copy(update={"alarms": rules}))
     home.calibrated("v", accepted=False)
     duty = callbacks(home, clock)
     look(duty)
@@ -155,7 +155,7 @@ def test_the_log_says_what_was_delivered_and_of_which_venue(stock, receiver, clo
     home, hook = stock(), receiver(Receiver, 204, 500, 204, 204)
     rules = Alarms(rejected_in_a_row=1, callback_url=hook.url)
     job = ended(home, hook.url)
-    home.venues.put(home.venue("w").model_copy(update={"alarms": rules}), anyway)
+    home.venues.put(home.venue("w").model_copy(update={"alarms": rules}))
     duty = callbacks(home, clock)
     with capture_logs(processors=[merge_contextvars]) as lines:
         look(duty)

@@ -18,7 +18,7 @@ from service.store import database as database
 from service.store import movement
 from tests.worker.calibration.synthetic import CROWNED, camera, paint_frame
 from tests.worker.jobs.by_models import history_of, solve
-from tests.worker.stock import Stock, anyway
+from tests.worker.stock import Stock
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.parameters import with_focal_length
@@ -103,7 +103,7 @@ class Year:
         self.clock = clock
         self.rules = rules
         self.duty = AlarmTimer(home.venues)
-        home.venues.put(stored(cameras(), rules, sigma), anyway)
+        home.venues.put(stored(cameras(), rules, sigma))
 
     @property
     def venue(self) -> Venue:

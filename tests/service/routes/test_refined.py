@@ -59,15 +59,6 @@ def test_a_camera_without_a_refined_pose_is_named_with_what_to_do(service, name)
     assert poses(service, f"/venues/{name}", lens="long").status_code == 422
 
 
-def test_a_camera_that_was_put_elsewhere_since_has_no_refined_pose_and_the_others_keep_theirs(service, name, job):
-    moved = {"cameras": {"left": {"pose": {"position": [1, -50, 8]}}}}
-    sent = {"Content-Type": "application/merge-patch+json"}
-    service.http.patch(f"/venues/{name}", json=moved, headers=sent).raise_for_status()
-    assert poses(service, f"/venues/{name}", lens="refined").json()["camera"] == "left"
-    assert poses(service, f"/venues/{name}", lens="refined", camera="right").status_code == 200
-    assert adopt(service, name).status_code == 404
-
-
 def test_a_refined_pose_and_lens_is_stored_as_a_revision_of_its_own(service, name, job):
     seen = service.http.get(f"/venues/{name}").headers["etag"]
     answer = adopt(service, name, **{"If-Match": seen})
@@ -81,11 +72,6 @@ def test_a_refined_pose_and_lens_is_stored_as_a_revision_of_its_own(service, nam
     assert answer.headers["etag"] == service.http.get(f"/venues/{name}").headers["etag"]
     again = service.calibrated(name, shade=1)
     assert [one["nights"] for one in again["result"]["cameras"]] == [2, 2]
-
-
-def test_to_store_it_twice_is_to_store_it_once(service, name, job):
-    assert adopt(service, name).json() == adopt(service, name).json()
-    assert len(service.http.get(f"/venues/{name}/history").json()["revisions"]) == 3
 
 
 def test_it_is_stored_in_the_venue_that_was_seen_and_for_a_camera_that_it_has(service, name, job):

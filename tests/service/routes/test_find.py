@@ -43,7 +43,7 @@ def refused(answer):
 
 
 def depth(stored, camera):
-    """How far in front of the pitch a camera stands, m: 40 is the first candidate, 60 the second, 50 none of them."""
+    """Distance of a camera to the pitch in m: 40 is the first candidate, 60 the second, 50 none of them."""
     return -next(one for one in stored["cameras"] if one["id"] == camera)["pose"]["position"][1]
 
 
@@ -118,7 +118,7 @@ def test_what_was_found_is_calibrated_with_the_frames_of_the_search(service, nam
     assert (answer.status_code, answer.json()["kind"], answer.json()["venue"]) == (202, "calibration", name)
     assert answer.headers["location"] == f"/jobs/{answer.json()['id']}"
     calibration = service.end(answer.json()["id"])
-    # Of the camera that was left out, the frame is too.
+    # The frame of the camera that was left out is left out too.
     assert list(calibration["frames"]) == ["left"]
     assert calibration["venue_revision"] == 2
     frames = [service.http.get(one["frames"]["left"][0]).content for one in (job, calibration)]
@@ -235,7 +235,6 @@ def test_a_key_is_one_search_by_its_content(service, name):
 
 def test_a_search_is_cancelled_and_its_frames_are_listed(service, name):
     job = find(service, name, place=site(name, "hang")).json()
-    service.running(job["id"])
     assert list(job["frames"]) == ["left", "right"]
     assert service.http.post(f"/jobs/{job['id']}/cancel").json()["status"] == "cancelled"
 

@@ -1,4 +1,4 @@
-"""What clients expect of any HTTP interface: conditions, pages, and how much an answer says."""
+"""HTTP conventions: conditions, pages, and the size of answers."""
 
 import httpx
 import pytest
