@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal, get_args
 from fastapi import APIRouter, Query, Request, Response
 
 from service.api import etags
-from service.api.context import InContext, VenueIdPath
+from service.api.context import Context, InContext, VenueIdPath
 from service.pages.live import CLOCKS, STATUSES, live_card
 from service.pages.outcome import CAME_BY, outcome_of, poses_in_use
 from service.pages.page_rendering import Page, render_page
@@ -20,7 +20,7 @@ from service.routes.contract.attribution import hide_other_actor
 from service.routes.contract.documented import needs_scope
 from service.routes.contract.guarded import Guarded
 from service.routes.contract.restricted import OnlyVenues, lists_by_venue
-from service.routes.venues import ExistingVenueId, existing_venue, venue_etag
+from service.routes.venues import existing_venue, venue_etag
 from service.schemas.health import Alarm, VenueHealth
 from service.schemas.history import Cause, Revision
 from service.schemas.job import Job
@@ -72,11 +72,13 @@ def venues(
     after: Annotated[str | None, Query(pattern=ID_PATTERN)] = None,
 ) -> Response:
     """Every venue, with its last result."""
-    found = context.venues.page(after, PER_PAGE, only)
+    with context.snapshot():
+        found = context.venues.page(after, PER_PAGE, only)
+        rows = venue_rows(context, found.venues)
     return render_page(
         request,
         "venues.html",
-        rows=venue_rows(context, found.venues),
+        rows=rows,
         unreadable=found.unreadable,
         after=found.next_cursor,
         first=not after,
@@ -102,10 +104,11 @@ def venue_rows(context: Repositories, venues: list[Venue]) -> list[VenueRow]:
 
 
 @router.get("/ui/venues/{venue_id}", openapi_extra=needs_scope("read"))
-def venue(venue_id: ExistingVenueId, request: Request, context: InContext) -> Response:
-    """One venue: its last result and how it came to it, or the ways out where it cannot be read."""
+def venue(venue_id: VenueIdPath, request: Request, context: InContext) -> Response:
+    """Show a venue: its last result and how it came to it, or the ways out where it cannot be read."""
     try:
-        return _venue_page(venue_id, request, context)
+        with context.snapshot():
+            content = _venue_content(venue_id, context)
     except UnreadableRow as unreadable:
         revisions = context.venues.history(venue_id, None, IN_TABLE)
         return render_page(
@@ -117,48 +120,46 @@ def venue(venue_id: ExistingVenueId, request: Request, context: InContext) -> Re
             revisions=[hide_other_actor(one) for one in revisions],
             restorable=context.venues.repairing(venue_id, [one.revision for one in revisions]),
         )
+    return render_page(request, "venue.html", **content)
 
 
-def _venue_page(venue_id: str, request: Request, context: InContext) -> Response:
+def _venue_content(venue_id: str, context: Context) -> dict[str, Any]:
+    """Return the content of the page of a venue. Raises `UnreadableRow`."""
     stored = existing_venue(venue_id, context)
-    # First: what happens from here on may be shown already, and is told of once more.
-    seen = context.events.newest([venue_id]).get(venue_id, 0)
-    ends = context.past_calibrations.of(venue_id, IN_TABLE)
     newest = context.past_calibrations.newest_result(venue_id)
-    job = context.jobs.several([newest]).get(newest) if newest else None
+    active = context.past_calibrations.active([venue_id]).get(venue_id)
+    jobs = context.jobs.several([one for one in (newest, active) if one])
+    job = jobs.get(newest or "")
     revisions = context.venues.history(venue_id, None, IN_TABLE)
     health = context.venues.health(venue_id)
     in_use = poses_in_use(context, venue_id)
-    active = context.past_calibrations.active([venue_id]).get(venue_id)
     a_year_ago = datetime.now(UTC) - IN_TRENDS
-    return render_page(
-        request,
-        "venue.html",
-        venue=stored,
-        ends=ends,
-        job=job,
-        revisions=[hide_other_actor(one) for one in revisions],
-        remembering=context.venues.with_memories(venue_id),
-        health=health,
-        in_use=in_use,
-        outcome=outcome_of(context, job, in_use),
-        came_by=CAME_BY,
-        undone=undone_jobs(revisions),
-        sizes=sizes_of(stored),
-        adoptable=context.adopted_fields.adoptable(job.id) if job else {},
-        restorable=context.venues.restorable(stored, [one.revision for one in revisions]),
-        kept_jobs=kept_jobs(context, revisions, health),
-        trends=[context.trends.of(stored, camera.id, a_year_ago) for camera in stored.cameras],
-        active=context.jobs.several([active]).get(active) if active else None,
-        live_poses=live_card(context, venue_id),
-        live_statuses=STATUSES,
-        live_clocks=CLOCKS,
-        formats=get_args(FormatName),
-        usual_view=ViewChoice(),
-        previewed=context.past_calibrations.last_taken(venue_id) is not None,
-        tag=etags.quoted(venue_etag(stored)),
-        seen=seen,
-    )
+    return {
+        "venue": stored,
+        "ends": context.past_calibrations.of(venue_id, IN_TABLE),
+        "job": job,
+        "revisions": [hide_other_actor(one) for one in revisions],
+        "remembering": context.venues.with_memories(venue_id),
+        "health": health,
+        "in_use": in_use,
+        "outcome": outcome_of(context, job, in_use),
+        "came_by": CAME_BY,
+        "undone": undone_jobs(revisions),
+        "sizes": sizes_of(stored),
+        "adoptable": context.adopted_fields.adoptable(job.id) if job else {},
+        "restorable": context.venues.restorable(stored, [one.revision for one in revisions]),
+        "kept_jobs": kept_jobs(context, revisions, health),
+        "trends": [context.trends.of(stored, camera.id, a_year_ago) for camera in stored.cameras],
+        "active": jobs.get(active or ""),
+        "live_poses": live_card(context, venue_id),
+        "live_statuses": STATUSES,
+        "live_clocks": CLOCKS,
+        "formats": get_args(FormatName),
+        "usual_view": ViewChoice(),
+        "previewed": context.past_calibrations.last_taken(venue_id) is not None,
+        "tag": etags.quoted(venue_etag(stored)),
+        "seen": context.events.newest([venue_id]).get(venue_id, 0),
+    }
 
 
 def undone_jobs(revisions: list[Revision]) -> Collection[str]:

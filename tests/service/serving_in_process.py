@@ -11,10 +11,11 @@ class InProcess:
     """The application without a server: `ask` answers as over HTTP, and an error of ours is a 500 as there."""
 
     def __init__(self, settings, key=None):
-        self._app = create_app(settings)
+        app = create_app(settings)
+        self.context = app.state.context
         self._headers = {"Authorization": f"Bearer {key}"} if key else {}
         self._loop = asyncio.new_event_loop()
-        transport = httpx.ASGITransport(self._app, raise_app_exceptions=False)
+        transport = httpx.ASGITransport(app, raise_app_exceptions=False)
         self._client = httpx.AsyncClient(transport=transport, base_url="http://localhost", headers=self._headers)
 
     def ask(self, method, path, **request):
@@ -22,5 +23,5 @@ class InProcess:
 
     def close(self):
         self._loop.run_until_complete(self._client.aclose())
-        self._app.state.context.close()
+        self.context.close()
         self._loop.close()
