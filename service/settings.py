@@ -24,7 +24,7 @@ from service import cores
 from service.secret_files import read_secret
 from service.variable_names import PREFIX, unread
 
-# Without SQLAlchemy and obstore: the commands of the client read settings too, and start quickly.
+# Checked without SQLAlchemy and obstore: commands of the client read settings, too, and must start quickly.
 DATABASE_URL = re.compile(r"sqlite://.*|postgresql(\+psycopg)?://[^/]*/[^/?]+(\?.*)?")
 FREED_ANGLES = " ".join(rf"-?{angle}([+-]\d{{1,3}}(\.\d+)?)?" for angle in ("pan", "tilt", "roll"))
 FREED_AXES = re.compile(rf"(-?[xyz] ){{3}}{FREED_ANGLES}")
@@ -34,13 +34,13 @@ HOST_PATTERN = re.compile(r"(?=.*[A-Za-z*])[A-Za-z0-9*._-]+")
 ADDRESS_PATTERN = re.compile(r"(?=.*\d)(?=.*\*)[\d.*-]+")
 ROOT_PATH = re.compile(r"(/[A-Za-z0-9_~-][A-Za-z0-9._~-]*)*")
 BLOB_URL = re.compile(r"(file|s3)://.+")
-# Settings that may stand in a file each, which ESC_..._FILE names.
+# Secret settings, which may be in a file that ESC_..._FILE names.
 SECRETS = ("database_url", "webhook_secret")
 MODEL_BESIDE_THE_CODE = Path(__file__).resolve().parent.parent / "models" / "unet.onnx"
 
 
 class Settings(BaseSettings):
-    """What an operator may change. Sizes in megabytes are 10^6 bytes, times are in seconds."""
+    """Settings of service and worker. A megabyte is 10^6 bytes; times are in seconds."""
 
     model_config = SettingsConfigDict(
         env_prefix=PREFIX, env_file=".env", env_ignore_empty=True, extra="ignore", hide_input_in_errors=True
@@ -299,13 +299,13 @@ class Settings(BaseSettings):
         dotenv_settings: PydanticBaseSettingsSource,
         file_secret_settings: PydanticBaseSettingsSource,  # noqa: ARG003
     ) -> tuple[PydanticBaseSettingsSource, ...]:
-        """Read secrets from the files that variables name, too."""
+        """Also read secrets from the files that variables name."""
         return init_settings, env_settings, dotenv_settings, _SecretFiles(settings_cls, env_settings, dotenv_settings)
 
     @field_validator("database_url")
     @classmethod
     def _is_of_a_database(cls, url: str | None) -> str | None:
-        # What was given may hold a password: it is not repeated.
+        # The error does not repeat the URL, which may hold a password.
         if url is not None and not DATABASE_URL.fullmatch(url):
             raise ValueError("expected is postgresql://user:password@host:5432/name or sqlite:////folder/esc.sqlite")
         return url
@@ -364,32 +364,32 @@ class Settings(BaseSettings):
 
     @property
     def webhook_keys(self) -> list[bytes]:
-        """What callbacks are signed with; none: callbacks are refused."""
+        """Keys that callbacks are signed with; empty: callbacks are refused."""
         return webhook_keys(self.webhook_secret)
 
     @property
     def home_database_url(self) -> str:
-        """The database that is used."""
+        """Address of the database."""
         return self.database_url or f"sqlite:///{self.data.absolute() / 'esc.sqlite'}"
 
     @property
     def home_blob_url(self) -> str:
-        """The object store that is used."""
+        """Address of the object store."""
         return self.blob_url or (self.data.absolute() / "blobs").as_uri()
 
     @property
     def native_environment(self) -> dict[str, str]:
-        """What a process that computes needs in its environment before NumPy and OpenCV are loaded."""
+        """Environment variables that a computing process needs before it loads NumPy and OpenCV."""
         # Arrays as small as a population's gain nothing from BLAS threads; ONNX Runtime and OpenCV get `threads`.
-        single = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-        of_pixels = {"OPENCV_IO_MAX_IMAGE_PIXELS": str(self.max_frame_pixels)}
+        blas_threads = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+        most_pixels = {"OPENCV_IO_MAX_IMAGE_PIXELS": str(self.max_frame_pixels)}
         # Drivers of GPUs map the memory of the device, and reserve more than they use.
-        limit = {} if self.provider == "cuda" else {"ESC_JOB_MEMORY_MB": f"{self.job_memory_mb:g}"}
-        return {**single, **of_pixels, **limit}
+        memory = {} if self.provider == "cuda" else {"ESC_JOB_MEMORY_MB": f"{self.job_memory_mb:g}"}
+        return {**blas_threads, **most_pixels, **memory}
 
     @property
     def listens_beyond_this_machine(self) -> bool:
-        """Whether others can reach the port."""
+        """True if other machines can reach the port."""
         try:
             return not ipaddress.ip_address(self.host).is_loopback
         except ValueError:
@@ -397,20 +397,20 @@ class Settings(BaseSettings):
 
 
 def setting_names() -> set[str]:
-    """Return the variables that settings are read from, those that name the file of a secret among them."""
+    """Return the names of all variables that settings are read from, including `ESC_..._FILE`."""
     return {f"{PREFIX}{name.upper()}" for name in Settings.model_fields} | {
         f"{PREFIX}{name.upper()}_FILE" for name in SECRETS
     }
 
 
 def unread_variables() -> list[str]:
-    """Return the variables `ESC_...` of the environment and of `.env` that nothing reads: they are misspelt."""
+    """Return the misspelt variables `ESC_...` of the environment and of `.env`: nothing reads them."""
     sources = DotEnvSettingsSource(Settings), EnvSettingsSource(Settings)
     return unread((name for source in sources for name in source.env_vars), setting_names())
 
 
 class _SecretFiles(PydanticBaseSettingsSource):
-    """The files that `ESC_..._FILE` names, in the environment or in `.env`."""
+    """Source of settings: files that `ESC_..._FILE` names, in the environment or in `.env`."""
 
     def __init__(self, settings: type[BaseSettings], *variables: PydanticBaseSettingsSource) -> None:
         super().__init__(settings)
@@ -420,18 +420,18 @@ class _SecretFiles(PydanticBaseSettingsSource):
             self._given |= {name.upper(): value for name, value in source.env_vars.items() if value}
 
     def get_field_value(self, field: Any, field_name: str) -> tuple[Any, str, bool]:  # noqa: ARG002
-        """Find one secret."""
+        """Return a secret, with its name."""
         prefix = self.config.get("env_prefix", "")
         return read_secret(f"{prefix}{field_name.upper()}", self._given), field_name, False
 
     def __call__(self) -> dict[str, Any]:
-        """Find all secrets that stand in files."""
+        """Return all secrets that are in files."""
         found = {name: self.get_field_value(None, name)[0] for name in SECRETS}
         return {name: secret for name, secret in found.items() if secret is not None}
 
 
 def webhook_keys(secret: SecretStr | None) -> list[bytes]:
-    """The keys in a setting; the message of an error does not repeat them."""
+    """Return the keys in a setting. Errors do not repeat them."""
     keys = []
     for part in secret.get_secret_value().split() if secret else ():
         prefix, _, encoded = part.partition("_")

@@ -1,7 +1,7 @@
-"""What Prometheus reads.
+"""Metrics for Prometheus.
 
-Requests are counted by the process that answers them. All else is read from the database at the moment it is asked for,
-so it is the same whichever API process is asked, however many workers there are and however often they were restarted.
+Each process counts the requests that it answers. Everything else is read from the database at each scrape, so that
+every API process shows the same, and restarts of workers lose nothing.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from service.store.trends import CameraTrend
 from service.store.unreadable import RowKind, unreadable_rows
 from service.store.workers import WorkerHeartbeat
 
-# Name, meaning and figure; a figure that is not known is no sample.
+# Name, help and value of gauges; an unknown value (None) makes no sample.
 OF_VENUES: tuple[tuple[str, str, Callable[[VenueGauges], float | None]], ...] = (
     (
         "esc_venue_stitch_error_pixels",
@@ -95,9 +95,9 @@ log = structlog.get_logger()
 
 
 class Metrics:
-    """The figures of one API process and, through `look`, those of the service."""
+    """Metrics of one API process and, through `read`, of the service."""
 
-    def __init__(self, look: Callable[[], StatisticsSnapshot], disk: Disk, silence_s: float) -> None:
+    def __init__(self, read: Callable[[], StatisticsSnapshot], disk: Disk, silence_s: float) -> None:
         self.registry = CollectorRegistry()
         self.requests = Counter(
             "esc_http_requests", "Requests answered.", ["method", "route", "status"], registry=self.registry
@@ -115,28 +115,28 @@ class Metrics:
             registry=self.registry,
         )
         ProcessCollector(registry=self.registry)
-        self.registry.register(_Stored(look, disk, silence_s))
+        self.registry.register(_StoredMetrics(read, disk, silence_s))
 
 
-class _Stored(Collector):
-    def __init__(self, look: Callable[[], StatisticsSnapshot], disk: Disk, silence_s: float) -> None:
-        self._look = look
+class _StoredMetrics(Collector):
+    def __init__(self, read: Callable[[], StatisticsSnapshot], disk: Disk, silence_s: float) -> None:
+        self._read = read
         self._disk = disk
         self._silence_s = silence_s
 
     def describe(self) -> Iterator[Metric]:
-        """Nothing: registering must not read the database."""
+        """Yield nothing, so that registering does not read the database."""
         yield from ()
 
     def collect(self) -> Iterator[Metric]:
-        """Read the database, and how full the disk is; what cannot be read is missing, the rest is told."""
+        """Read database and disk; metrics that cannot be read are missing."""
         yield InfoMetricFamily(
             "esc_build", "The version.", {"version": build.version(), "commit": build.commit() or ""}
         )
         yield from self._room()
         yield from _unreadable()
         try:
-            figures = self._look()
+            figures = self._read()
         except DATABASE_OUTAGES:
             log.warning("no figures for Prometheus", exc_info=True)
             yield _gauge("esc_database_up", "Whether the database answers.", 0)
@@ -247,7 +247,7 @@ def _gauges(
     figures: Sequence[Figures],
     labels: Mapping[str, Callable[[Figures], str]],
 ) -> Iterator[Metric]:
-    """Yield a gauge for each of these figures of venues or cameras; what has none is left out."""
+    """Yield the gauges of venues or cameras, without samples for unknown values."""
     for name, meaning, figure in families:
         family = GaugeMetricFamily(name, meaning, labels=list(labels))
         for one in figures:

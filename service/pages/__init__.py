@@ -1,4 +1,4 @@
-"""The operator's page: rendered here, drawn by plain HTML, CSS and a little JavaScript, nothing from the internet."""
+"""The operator's web pages: rendered on the server, with a little JavaScript and nothing from the internet."""
 
 from fastapi import APIRouter
 
@@ -15,7 +15,7 @@ from service.pages import (
     venues,
 )
 
-# Before the routes of the interface: for browsers alone, at addresses that the interface has as well.
+# Included before the routes of the interface: at the same paths, for browsers alone.
 FOR_BROWSERS: APIRouter = problem_pages.router
 show_browsers_what_is_missing = problem_pages.show_browsers_what_is_missing
 ROUTERS: tuple[APIRouter, ...] = (

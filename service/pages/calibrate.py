@@ -1,4 +1,4 @@
-"""Sending frames: which camera gets which, whether they fit, and what is to be done with them."""
+"""Forms that upload frames, for a calibration or a search for cameras."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ router = APIRouter(route_class=Page, include_in_schema=False)
 
 @router.get("/ui/venues/{venue_id}/calibrate", openapi_extra=needs_scope("calibrate"))
 def calibrate(venue: ExistingVenue, request: Request, context: InContext) -> Response:
-    """The form that a calibration begins with."""
+    """Show the form for a calibration."""
     return _form(request, "calibrate.html", venue, context.settings)
 
 
 @router.get("/ui/venues/{venue_id}/find", openapi_extra=needs_scope("calibrate"))
 def find(venue: ExistingVenue, request: Request, context: InContext) -> Response:
-    """The form by which cameras are looked for, wherever they are stored."""
+    """Show the form for a search for cameras."""
     return _form(request, "find.html", venue, context.settings)
 
 

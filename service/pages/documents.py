@@ -1,4 +1,4 @@
-"""The documents that pages show: Markdown files of the package, as HTML with links that lead somewhere here."""
+"""Documents of the package, rendered from Markdown to HTML with links between pages of the service."""
 
 from __future__ import annotations
 
@@ -12,35 +12,35 @@ from markdown_it.token import Token
 FILES = Path(__file__).parent / "documents"
 NAMES: tuple[str, ...] = tuple(sorted(path.stem for path in FILES.glob("*.md")))
 _markdown = MarkdownIt("commonmark", {"html": False}).enable("table")
-# Elsewhere than at a heading, a link of one of our files to another.
+# Links that can be followed here: to a document, to a heading, or both.
 _LINK = re.compile(r"(?:(?P<name>[a-z-]+)\.md)?(?P<anchor>#[a-z0-9-]+)?")
 
 
 def address(name: str, anchor: str = "") -> str:
-    """Where a document is shown, at one of its headings."""
+    """Return the address of a document, at one of its headings."""
     return f"/ui/documents/{name}" + (f"#{anchor}" if anchor else "")
 
 
 @cache
 def title(name: str) -> str:
-    """The first heading of a document."""
+    """Return the first heading of a document."""
     return next(_text(inline) for opening, inline in _headings(_tokens(name)) if opening.tag == "h1")
 
 
 @cache
 def whole(name: str) -> str:
-    """A document without its first heading."""
+    """Return a document without its first heading, as HTML."""
     return _rendered(_tokens(name)[3:])
 
 
 @cache
 def section(name: str, anchor: str) -> str:
-    """The part of a document below the heading of this anchor."""
+    """Return the section of a document with this anchor, as HTML."""
     return _rendered(_section(name, anchor))
 
 
 def _section(name: str, anchor: str) -> list[Token]:
-    """The part of a document below the heading of this anchor: of the first heading, what comes before the second."""
+    """Return the section below the heading with this anchor; below the title, the text before the next heading."""
     tokens = _tokens(name)
     begin, level = next(
         (number, token.tag)
@@ -61,7 +61,7 @@ def _section(name: str, anchor: str) -> list[Token]:
 
 @cache
 def reason(name: str, anchor: str, word: str) -> str:
-    """Return what a section that is about several reasons says of this one; else the whole section."""
+    """Return the paragraphs about one reason in a section about several; else the whole section, as HTML."""
     tokens = _section(name, anchor)
     begins = [
         (number, f"`{word}`" in tokens[number + 1].content)
@@ -81,12 +81,12 @@ def _rendered(tokens: list[Token]) -> str:
 
 @cache
 def _tokens(name: str) -> list[Token]:
-    """What a document is made of, made fit for a page of this service."""
+    """Return the tokens of a document, with anchors, links to pages, and tables that can scroll."""
     tokens: list[Token] = []
     for token in _markdown.parse((FILES / f"{name}.md").read_text(encoding="utf-8")):
         if token.type == "table_open":
             tokens.append(Token("html_block", "", 0, content='<div class="scrolls" tabindex="0">'))
-        # Alignment comes as a style in place, which the policy of pages refuses.
+        # Column alignment is an inline style, which the Content-Security-Policy forbids.
         token.attrs.pop("style", None)
         if token.type == "inline":
             token.children = _linked(name, token.children or [])
@@ -99,7 +99,7 @@ def _tokens(name: str) -> list[Token]:
 
 
 def _headings(tokens: list[Token]) -> list[tuple[Token, Token]]:
-    """The beginning of each heading, and what it says."""
+    """Return the opening token and the text token of each heading."""
     return [(token, tokens[number + 1]) for number, token in enumerate(tokens) if token.type == "heading_open"]
 
 
@@ -108,12 +108,12 @@ def _text(inline: Token) -> str:
 
 
 def _anchor(heading: str) -> str:
-    """As forges make them."""
+    """Return the anchor of a heading, as GitHub makes it."""
     return re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-")
 
 
 def _linked(name: str, tokens: list[Token]) -> list[Token]:
-    """Links to what is shown here lead there; of others their words are left."""
+    """Point links to documents at their pages, and replace other links by their words."""
     kept: list[Token] = []
     dropped = False
     for token in tokens:

@@ -1,4 +1,4 @@
-"""Drawing what of a camera's frame is to be ignored."""
+"""Page for drawing the ignored areas of a venue's cameras."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ router = APIRouter(route_class=Page, include_in_schema=False)
 
 @router.get("/ui/venues/{venue_id}/ignore", openapi_extra=needs_scope("admin"))
 def ignore(venue: ExistingVenue, request: Request, context: InContext) -> Response:
-    """The frames of the newest result, or files, under the areas of each camera."""
+    """Show the ignored areas of each camera over the frames of the newest result."""
     newest = context.past_calibrations.newest_result(venue.id)
     job = context.jobs.get(newest) if newest else None
     links = job.links if job else {}

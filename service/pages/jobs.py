@@ -1,4 +1,4 @@
-"""Jobs: all of them with filters, and one with its course, its numbers and its pictures."""
+"""Pages of jobs: the list with filters, and a job with its progress, numbers and pictures."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from service.store.jobs.task import UnreadableJob
 from service.store.repositories import Repositories
 
 PER_PAGE = 50
-# In their order; other kinds of jobs have others.
+# Stages of a calibration in their order.
 STAGES = ("segmentation", "evolution", "refinement", "preview")
 router = APIRouter(prefix="/ui/jobs", route_class=Page, include_in_schema=False)
 
@@ -37,7 +37,7 @@ def jobs(
     kind: Annotated[str, Query(pattern=f"^({'|'.join(get_args(JobKind))})?$")] = "",
     cursor: Annotated[str | None, Query(pattern=JOB_ID_PATTERN)] = None,
 ) -> Response:
-    """Jobs, newest first. A form sends the filters that were left open as empty strings."""
+    """List jobs, newest first. A form sends unset filters as empty strings."""
     wanted = JobPage(PER_PAGE, before=cursor, venue=venue or None, status=status or None, kind=kind or None, only=only)
     found = context.jobs.page(wanted)
     return render_page(

@@ -1,4 +1,4 @@
-"""The ways to a first calibration: by frames alone, or by the pitch, the lenses and clicked first poses."""
+"""Pages for a new venue: from frames alone, or from pitch, lenses and clicked first poses."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ data = APIRouter(prefix="/ui/new-venue", route_class=Guarded, include_in_schema=
 
 @router.get("/ui/new-venue", openapi_extra=needs_scope("admin"))
 def new_venue(request: Request, context: InContext) -> Response:
-    """The sport and a frame of each camera, from which a job finds the cameras."""
+    """Show the form for a sport and a frame of each camera, from which a job finds the cameras."""
     return _described(request, context, "new_venue.html")
 
 
 @router.get("/ui/new-venue/by-hand", openapi_extra=needs_scope("admin"))
 def by_hand(request: Request, context: InContext) -> Response:
-    """The guided way; what it gathers stays in the browser until the venue is created."""
+    """Show the guided form; its data stay in the browser until the venue is created."""
     return _described(request, context, "venue_by_hand.html")
 
 
@@ -48,7 +48,7 @@ def _described(request: Request, context: Context, template: str) -> Response:
 
 
 def _free_id(context: Context) -> str:
-    """An id that no venue has and no search was for, of which a venue can still be made: for those who do not care."""
+    """Return an unused id for a new venue: no venue and no job has it."""
     names = (f"venue-{number}" for number in count(1))
     return next(name for name in names if context.venues.get(name) is None and not _has_jobs(context, name))
 
@@ -60,19 +60,19 @@ def _has_jobs(context: Context, venue_id: str) -> bool:
 
 @data.get("/free", openapi_extra=needs_scope("read"))
 def free_id(context: InContext) -> dict[str, str]:
-    """Propose an id for a new venue, for a page on which the one that it was given may have been taken meanwhile."""
+    """Propose an unused id for a new venue; the one in the page may have been taken since."""
     return {"id": _free_id(context)}
 
 
 @data.get("/taken", openapi_extra=needs_scope("read"))
 def is_id_taken(context: InContext, venue_id: Annotated[str, Query(alias="id", pattern=ID_PATTERN)]) -> dict[str, bool]:
-    """Whether there is a venue of this id already."""
+    """Answer whether a venue has this id."""
     return {"taken": context.venues.get(venue_id) is not None}
 
 
 @data.post("/plan", openapi_extra=needs_scope("read"))
 def plan(field: FieldOfPlay) -> dict[str, Any]:
-    """A pitch from above: the field with all its measures, its lines and its named points, in metres."""
+    """Answer a pitch from above: the field with all dimensions, its lines and its named points, in metres."""
     return {
         "field": field.model_dump(mode="json"),
         "lines": [_polyline(shape) for shape in field.markings],
@@ -82,7 +82,7 @@ def plan(field: FieldOfPlay) -> dict[str, Any]:
 
 @data.post("/pose", openapi_extra=needs_scope("calibrate"))
 async def pose(asked: ClickedPoseRequest, context: InContext) -> ClickedPose:
-    """Where a camera stands by what was clicked so far."""
+    """Answer the pose of a camera by the points that were clicked so far."""
     return await context.clicked_poses.find(asked)
 
 

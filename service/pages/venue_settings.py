@@ -1,4 +1,4 @@
-"""Changing a venue that is there: its settings, and new first poses of its cameras."""
+"""Pages that change a venue: its settings, and new first poses of its cameras."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from service.schemas.geometry import Intrinsics
 from service.schemas.health import Alarms
 from service.schemas.names import LensModel
 
-# The last so many calibrations and revisions say what is usual: three months of nights.
+# Calibrations and revisions that suggest limits of alarms: three months of nights.
 SUGGESTED_BY = 100
 router = APIRouter(route_class=Page, include_in_schema=False)
 
 
 @router.get("/ui/venues/{venue_id}/settings", openapi_extra=needs_scope("admin"))
 def settings(venue: ExistingVenue, request: Request, context: InContext) -> Response:
-    """Name and field, alarms, lenses, and the end of a venue."""
-    # NumPy takes its time to load.
+    """Show name, field, alarms and lenses of a venue, and the button that deletes it."""
+    # Imported late: NumPy loads slowly.
     from service.schemas.lens_map import lens_doubts
 
     lenses = {camera.id: _readable(camera.intrinsics) for camera in venue.cameras}
@@ -49,7 +49,7 @@ def settings(venue: ExistingVenue, request: Request, context: InContext) -> Resp
 
 @router.get("/ui/venues/{venue_id}/first-pose", openapi_extra=needs_scope("admin"))
 def first_pose(venue: ExistingVenue, request: Request, context: InContext) -> Response:
-    """Clicking points in new frames of a venue's cameras."""
+    """Show the form for clicking points in new frames of a venue's cameras."""
     return render_page(
         request,
         "first_pose.html",
@@ -62,6 +62,6 @@ def first_pose(venue: ExistingVenue, request: Request, context: InContext) -> Re
 
 
 def _readable(lens: Intrinsics) -> str:
-    """JSON with a line for each part."""
+    """Return a lens as JSON with a line for each member."""
     parts = [f"  {json.dumps(name)}: {json.dumps(value)}" for name, value in lens.model_dump(mode="json").items()]
     return "{\n" + ",\n".join(parts) + "\n}"
