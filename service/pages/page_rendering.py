@@ -23,7 +23,7 @@ from service.api.root_path import with_root_path
 from service.pages import formatting
 from service.pages.assets import address
 from service.pages.seam import is_within_uncertainty, seam_curve
-from service.pages.trend_curves import trend_curves
+from service.pages.trend_charts import trend_charts
 from service.routes.contract.guarded import Guarded
 from service.schemas.names import Scope
 from service.schemas.problems import PROBLEM_TYPES, REFUSAL_REASONS, Problem
@@ -62,7 +62,7 @@ templates.globals |= {
     "version": version("esc-calibration"),
     "is_within_uncertainty": is_within_uncertainty,
     "seam_curve": seam_curve,
-    "trend_curves": trend_curves,
+    "trend_charts": trend_charts,
     "reasons": REFUSAL_REASONS,
     "alarm_words": formatting.ALARMS,
     "kind_words": formatting.KINDS,
