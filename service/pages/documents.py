@@ -30,53 +30,41 @@ def title(name: str) -> str:
 @cache
 def whole(name: str) -> str:
     """Return a document without its first heading, as HTML."""
-    return _rendered(_tokens(name)[3:])
+    return _without_heading(_parts(name))
 
 
 @cache
 def section(name: str, anchor: str) -> str:
-    """Return the section of a document with this anchor, as HTML."""
-    return _rendered(_section(name, anchor))
-
-
-def _section(name: str, anchor: str) -> list[Token]:
-    """Return the section below the heading with this anchor; below the title, the text before the next heading."""
-    tokens = _tokens(name)
-    begin, level = next(
-        (number, token.tag)
-        for number, token in enumerate(tokens)
-        if token.type == "heading_open" and token.attrGet("id") == anchor
-    )
-    last = "h2" if level == "h1" else level
-    end = next(
-        (
-            number
-            for number, token in enumerate(tokens[begin + 3 :], begin + 3)
-            if token.type == "heading_open" and token.tag <= last
-        ),
-        len(tokens),
-    )
-    return tokens[begin + 3 : end]
+    """Return the text below the heading with this anchor, as HTML; below the title, what precedes the next heading."""
+    parts = _parts(name)
+    begin = next(number for number, part in enumerate(parts) if part.startswith(f'id="{anchor}"', len("<h1 ")))
+    level = max(_level(parts[begin]), 2)
+    ends = [number for number in range(begin + 1, len(parts)) if _level(parts[number]) <= level]
+    return _without_heading(parts[begin : min(ends, default=None)])
 
 
 @cache
 def reason(name: str, anchor: str, word: str) -> str:
     """Return the paragraphs about one reason in a section about several; else the whole section, as HTML."""
-    tokens = _section(name, anchor)
-    begins = [
-        (number, f"`{word}`" in tokens[number + 1].content)
-        for number, token in enumerate(tokens)
-        if token.type == "paragraph_open" and tokens[number + 1].content.startswith("Reason `") and token.level == 0
-    ]
-    if len(begins) < 2:
-        return _rendered(tokens)
-    ends = [number for number, _ in begins[1:]] + [len(tokens)]
-    own = [tokens[begin:end] for (begin, is_own), end in zip(begins, ends, strict=True) if is_own]
-    return _rendered([token for part in own for token in part]) if own else _rendered(tokens)
+    content = section(name, anchor)
+    _, *reasons = re.split(r"(?=<p>Reason <code>)", content)
+    own = [part for part in reasons if f"<code>{word}</code>" in part.partition("</p>")[0]]
+    return "".join(own) if own and len(reasons) > 1 else content
 
 
-def _rendered(tokens: list[Token]) -> str:
-    return str(_markdown.renderer.render(tokens, _markdown.options, {}))
+@cache
+def _parts(name: str) -> list[str]:
+    """Return a document as HTML, split before each heading."""
+    rendered = str(_markdown.renderer.render(_tokens(name), _markdown.options, {}))
+    return re.split(r'(?=<h[1-6] id=")', rendered)[1:]
+
+
+def _level(part: str) -> int:
+    return int(part[len("<h")])
+
+
+def _without_heading(parts: list[str]) -> str:
+    return "".join(parts).partition("\n")[2]
 
 
 @cache
