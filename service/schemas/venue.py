@@ -154,9 +154,9 @@ VENUE_EXAMPLE: dict[str, Any] = {
 
 PATCH_EXAMPLES: dict[str, Any] = {
     "an alarm": {"value": {"alarms": {"rejected_in_a_row": 3}}},
-    "who is told of new poses": {"value": {"webhooks": [WEBHOOK_EXAMPLE]}},
+    "a webhook for new poses": {"value": {"webhooks": [WEBHOOK_EXAMPLE]}},
     "no schedule": {"value": {"schedule": None}},
-    "what its stitched view shows": {"value": {"view": VIEW_EXAMPLE}},
+    "settings of the stitched view": {"value": {"view": VIEW_EXAMPLE}},
     "the source of a camera": {"value": {"cameras": {"left": {"source": "http://10.1.0.7/snapshot.jpg"}}}},
 }
 
@@ -181,19 +181,27 @@ class Site(NamedField):
     cameras: list[CameraIn] = Field([])
 
 
-class VenueIn(NamedField):
-    """A venue in a request."""
+class _VenueSettings(NamedField):
+    """A venue without the type of its cameras."""
 
-    model_config = ConfigDict(json_schema_extra={"examples": [VENUE_EXAMPLE]})
-
-    cameras: Annotated[list[CameraIn], Field(min_length=1, max_length=32)]
+    cameras: list[Any]
     accept: Accept = "each"
     lens: Lens = "fixed"
     recover: Recover = "propose"
     alarms: Alarms | None = None
     schedule: Schedule | None = None
     webhooks: Webhooks = Field([])
-    view: ViewChoice | None = Field(None, description="What its stitched view shows; null: what suits the cameras.")
+    view: ViewChoice | None = Field(
+        None, description="Settings of its stitched view; null: chosen to suit the cameras."
+    )
+
+
+class VenueIn(_VenueSettings):
+    """A venue in a request."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [VENUE_EXAMPLE]})
+
+    cameras: Annotated[list[CameraIn], Field(min_length=1, max_length=32)]
     warnings: list[str] = Field(
         [], exclude=True, description="Ignored: so that what answers a PUT can be put again as it is."
     )
@@ -225,17 +233,10 @@ class VenueIn(NamedField):
         return Venue(**parts | {"cameras": cameras})
 
 
-class Venue(NamedField):
+class Venue(_VenueSettings):
     """A venue with its current poses."""
 
     cameras: list[Camera]
-    accept: Accept = "each"
-    lens: Lens = "fixed"
-    recover: Recover = "propose"
-    alarms: Alarms | None = None
-    schedule: Schedule | None = None
-    webhooks: Webhooks = Field([])
-    view: ViewChoice | None = Field(None, description="What its stitched view shows; null: what suits the cameras.")
 
     @property
     def poses(self) -> dict[str, Pose]:
