@@ -26,9 +26,9 @@ def commit() -> str | None:
         return COMMIT.read_text().strip() or None
     if not (HERE.parent / ".git").exists():
         return None
-    asked = ["git", "-C", str(HERE), "rev-parse", "HEAD"]
+    command = ["git", "-C", str(HERE), "rev-parse", "HEAD"]
     try:
-        return subprocess.run(asked, capture_output=True, text=True, check=True, timeout=5).stdout.strip()
+        return subprocess.run(command, capture_output=True, text=True, check=True, timeout=5).stdout.strip()
     except (OSError, subprocess.SubprocessError):
         return None
 

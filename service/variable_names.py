@@ -15,9 +15,9 @@ OF_TESTS = "ESC_TEST_"
 SLIP = 0.8
 
 
-def unread(given: Iterable[str], settings: Collection[str]) -> list[str]:
-    """Return the given `ESC_...` names, in capitals, that nothing reads."""
-    names = {name.upper() for name in given if name.upper().startswith(PREFIX)}
+def unread(variables: Iterable[str], settings: Collection[str]) -> list[str]:
+    """Return the `ESC_...` names among the variables, in capitals, that nothing reads."""
+    names = {name.upper() for name in variables if name.upper().startswith(PREFIX)}
     # Kubernetes sets variables for each service, for esc-api: ESC_API_SERVICE_HOST, ESC_API_PORT_8000_TCP ...
     services = tuple(name.removesuffix("SERVICE_HOST") for name in names if name.endswith("_SERVICE_HOST"))
     of_kubernetes = tuple(f"{service}{part}" for service in services for part in ("SERVICE_", "PORT"))
@@ -33,7 +33,7 @@ def suggestion(name: str, known: Iterable[str]) -> str | None:
     return f"{PREFIX}{near[0]}" if near else None
 
 
-def misspelt_for_client(given: Iterable[str]) -> dict[str, str]:
-    """Return the variable of the client that each of the given names misspells, by the name."""
-    near = {name: get_close_matches(name, OF_CLIENTS, 1, SLIP) for name in unread(given, ())}
+def misspelt_for_client(variables: Iterable[str]) -> dict[str, str]:
+    """Return misspelt variables of the client, each with its correct name."""
+    near = {name: get_close_matches(name, OF_CLIENTS, 1, SLIP) for name in unread(variables, ())}
     return {name: meant[0] for name, meant in near.items() if meant}

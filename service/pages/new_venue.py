@@ -81,9 +81,9 @@ def plan(field: FieldOfPlay) -> dict[str, Any]:
 
 
 @data.post("/pose", openapi_extra=needs_scope("calibrate"))
-async def pose(asked: ClickedPoseRequest, context: InContext) -> ClickedPose:
+async def pose(clicked: ClickedPoseRequest, context: InContext) -> ClickedPose:
     """Answer the pose of a camera by the points that were clicked so far."""
-    return await context.clicked_poses.find(asked)
+    return await context.clicked_poses.find(clicked)
 
 
 def _polyline(shape: Shape) -> list[Point]:

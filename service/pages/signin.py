@@ -35,10 +35,10 @@ async def sign_in_page(
 async def sign_in(request: Request, context: InContext) -> Response:
     """Begin a session for a valid key."""
     _require_own_page(request)
-    given = await _form(request)
-    target = local_target(given.get("next", "/"))
+    form = await _form(request)
+    target = local_target(form.get("next", "/"))
     try:
-        session = await context.authenticator.sign_in(request, given.get("key", ""))
+        session = await context.authenticator.sign_in(request, form.get("key", ""))
     except Problem as problem:
         status = PROBLEM_TYPES[problem.kind].status
         return render_page(request, "sign_in.html", status, next=target, problem=problem)

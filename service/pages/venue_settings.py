@@ -30,11 +30,11 @@ def settings(venue: ExistingVenue, request: Request, context: InContext) -> Resp
     from service.schemas.lens_map import lens_doubts
 
     lenses = {camera.id: _readable(camera.intrinsics) for camera in venue.cameras}
-    shown = venue.model_copy(update={"alarms": venue.alarms or Alarms()})
+    with_alarms = venue.model_copy(update={"alarms": venue.alarms or Alarms()})
     return render_page(
         request,
         "settings.html",
-        venue=shown,
+        venue=with_alarms,
         lenses=lenses,
         templates=NAMES,
         suggested=suggested_limits(

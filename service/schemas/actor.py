@@ -10,7 +10,7 @@ from service.schemas.base import Schema
 
 # Shown in place of the name to keys that may not see it.
 ANOTHER_KEY = "another key"
-BY = "Who made the change; null: the service itself, or a version before 0.2.0."
+BY = "Author of the change; null: the service itself, or a version before 0.2.0."
 
 
 class Actor(Schema):

@@ -30,8 +30,8 @@ class SoughtCameraIn(Schema):
     )
     intrinsics: Intrinsics | None = Field(
         None,
-        description="Its lens. The focal length is searched for, too, if the `sigma` of `fx` is above 2 %. Absent: "
-        "lens and pose are found together.",
+        description="Lens of the camera. The focal length is searched for, too, if the `sigma` of `fx` is above 2 %. "
+        "Absent: lens and pose are found together.",
     )
     field_of_view_deg: Annotated[Number, Field(ge=5, le=150)] | None = Field(
         None,
