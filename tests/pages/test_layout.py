@@ -26,9 +26,9 @@ def inside(page, part):
     return box["x"] >= 0 and box["x"] + box["width"] <= PHONE["width"]
 
 
-def test_a_phone_shows_all_of_each_row_with_what_it_is(stub, phone):
-    name = stub.venue("small")
-    job = stub.calibrated(name)["id"]
+def test_a_phone_shows_all_of_each_row_with_what_it_is(stored, phone):
+    name = "small"
+    job = stored.calibrated(name)
     phone.goto(f"/ui/venues/{name}")
     for section in ("Revisions of the poses", "Download the poses in use"):
         phone.locator("summary", has_text=section).click()
@@ -44,9 +44,9 @@ def test_a_phone_shows_all_of_each_row_with_what_it_is(stub, phone):
     assert all(inside(phone, cell) for cell in phone.locator("tbody td").all())
 
 
-def test_a_phone_folds_what_is_not_needed_first_and_the_address_opens_it(stub, phone):
-    name = stub.venue("folded")
-    stub.calibrated(name)
+def test_a_phone_folds_what_is_not_needed_first_and_the_address_opens_it(stored, phone):
+    name = "folded"
+    stored.calibrated(name)
     phone.goto(f"/ui/venues/{name}")
     restore, cron = phone.get_by_role("button", name="Restore revision 1"), phone.get_by_label("Cron schedule")
     for hidden in (restore, cron):
@@ -64,12 +64,12 @@ def test_a_phone_folds_what_is_not_needed_first_and_the_address_opens_it(stub, p
     expect(restore).to_be_hidden()
 
 
-def test_what_a_phone_has_folded_stays_folded_while_the_page_follows_what_happens(stub, phone):
-    name = stub.venue("followed")
-    stub.calibrated(name)
+def test_what_a_phone_has_folded_stays_folded_while_the_page_follows_what_happens(stored, phone):
+    name = "unfolded"
+    stored.calibrated(name)
     phone.goto(f"/ui/venues/{name}")
     phone.locator("summary", has_text="Download the poses in use").click()
-    stub.calibrated(name, shade=1)
+    stored.calibrated(name)
     expect(phone.locator("[data-part=history] tbody tr:has(.badge)")).to_have_count(2)
     expect(phone.get_by_role("button", name="Restore revision 1")).to_be_hidden()
     expect(phone.get_by_role("link", name="opencv, camera right")).to_be_visible()

@@ -1,4 +1,4 @@
-"""A page shows one state of the database, however many questions it asks."""
+"""Pages without a browser: each shows one state of the database, however many questions it asks."""
 
 from collections import Counter
 
