@@ -185,7 +185,7 @@ def _begin_sqlite(connection: sa.Connection) -> None:
 def reading(engine: sa.Engine) -> Iterator[sa.Connection]:
     """A transaction that sees one state of the database and takes no lock; inside `snapshot` it is that one."""
     shared = _snapshot.get()
-    if shared is not None:
+    if shared is not None and shared.engine is engine:
         yield shared
         return
     with engine.connect().execution_options(**SNAPSHOT[engine.dialect.name]) as connection, connection.begin():
@@ -194,7 +194,7 @@ def reading(engine: sa.Engine) -> Iterator[sa.Connection]:
 
 @contextmanager
 def snapshot(engine: sa.Engine) -> Iterator[None]:
-    """Let every `reading` in the block share one transaction, and so see the same state of the database."""
+    """Let every `reading` of this engine in the block share one transaction, and so see the same state."""
     with reading(engine) as connection:
         token = _snapshot.set(connection)
         try:
