@@ -4,14 +4,12 @@ from fastapi import APIRouter
 
 from service.pages import (
     assets,
-    calibrate,
-    ignore,
     jobs,
     live,
     new_venue,
     problem_pages,
     signin,
-    venue_settings,
+    venue_forms,
     venues,
 )
 
@@ -26,9 +24,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     venues.router,
     venues.data,
     live.data,
-    calibrate.router,
-    ignore.router,
-    venue_settings.router,
+    venue_forms.router,
     new_venue.router,
     new_venue.data,
     jobs.router,

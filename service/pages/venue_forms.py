@@ -1,4 +1,4 @@
-"""Pages that change a venue: its settings, and new first poses of its cameras."""
+"""Forms of a venue: its settings, ignored areas and first poses, and frames for a calibration or a search."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from service.routes.venues import ExistingVenue, venue_etag
 from service.schemas.geometry import Intrinsics
 from service.schemas.health import Alarms
 from service.schemas.names import LensModel
+from service.settings import Settings
 
 # Calibrations and revisions that suggest limits of alarms: three months of nights.
 SUGGESTED_BY = 100
@@ -59,6 +60,32 @@ def first_pose(venue: ExistingVenue, request: Request, context: InContext) -> Re
         most=round(context.settings.max_frame_mb * 1e6),
         tag=etags.quoted(venue_etag(venue)),
     )
+
+
+@router.get("/ui/venues/{venue_id}/ignore", openapi_extra=needs_scope("admin"))
+def ignore(venue: ExistingVenue, request: Request, context: InContext) -> Response:
+    """Show the ignored areas of each camera over the frames of the newest result."""
+    newest = context.past_calibrations.newest_result(venue.id)
+    job = context.jobs.get(newest) if newest else None
+    links = job.links if job else {}
+    frames = {camera.id: links.get(f"frame/{camera.id}") for camera in venue.cameras}
+    return render_page(request, "ignore.html", venue=venue, frames=frames)
+
+
+@router.get("/ui/venues/{venue_id}/calibrate", openapi_extra=needs_scope("calibrate"))
+def calibrate(venue: ExistingVenue, request: Request, context: InContext) -> Response:
+    """Show the form for a calibration."""
+    return render_page(request, "calibrate.html", venue=venue, limits=_upload_limits(context.settings))
+
+
+@router.get("/ui/venues/{venue_id}/find", openapi_extra=needs_scope("calibrate"))
+def find(venue: ExistingVenue, request: Request, context: InContext) -> Response:
+    """Show the form for a search for cameras."""
+    return render_page(request, "find.html", venue=venue, limits=_upload_limits(context.settings))
+
+
+def _upload_limits(limits: Settings) -> dict[str, int]:
+    return {"frames": limits.max_frames_per_camera, "bytes": round(limits.max_frame_mb * 1e6)}
 
 
 def _readable(lens: Intrinsics) -> str:
