@@ -88,34 +88,23 @@ def test_a_switch_and_the_focus_stay_where_they_are_when_a_part_is_shown_anew(st
     wait_until(page, "document.activeElement.tagName === 'A'")
 
 
-def test_a_page_says_that_the_service_is_away_and_goes_on_when_it_is_back(tmp_path, visit):
+def test_pages_say_that_the_service_is_away_and_go_on_when_it_is_back(tmp_path, visit):
     service = Service(tmp_path / "coming-back", "serve")
     service.venue("patient")
-    page = visit(service.url, "/ui/venues/patient", forgiven=AWAY)
-    hint = page.get_by_text("The service does not answer.")
-    expect(hint).to_be_hidden()
+    pages = [visit(service.url, path, forgiven=AWAY) for path in ("/", "/ui/jobs", "/ui/venues/patient")]
+    hints = [page.get_by_text("The service does not answer.") for page in pages]
+    for hint in hints:
+        expect(hint).to_be_hidden()
     assert service.stop() == 0
-    expect(hint).to_be_visible()
+    for hint in hints:
+        expect(hint).to_be_visible(timeout=20_000)
     service.start(int(service.url.rpartition(":")[2]))
+    for hint in hints:
+        expect(hint).to_be_hidden(timeout=20_000)
     stock = Stock(service.data)
     stock.calibrated("patient")
     stock.engine.dispose()
-    expect(page.locator(".verdict-big")).to_have_text(re.compile("Accepted"))
-    expect(hint).to_be_hidden()
-    service.kill()
-
-
-@pytest.mark.parametrize("path", ["/", "/ui/jobs"])
-def test_a_list_says_that_the_service_is_away_and_goes_on_when_it_is_back(tmp_path, visit, path):
-    service = Service(tmp_path / "coming-back", "serve")
-    service.venue("patient")
-    page = visit(service.url, path, forgiven=AWAY)
-    hint = page.get_by_text("The service does not answer.")
-    expect(hint).to_have_count(0)
-    assert service.stop() == 0
-    expect(hint).to_be_visible(timeout=20_000)
-    service.start(int(service.url.rpartition(":")[2]))
-    expect(hint).to_have_count(0, timeout=20_000)
+    expect(pages[2].locator(".verdict-big")).to_have_text(re.compile("Accepted"))
     service.kill()
 
 
