@@ -1,4 +1,4 @@
-"""What pages offer can be done, and what cannot be done any more is said in words."""
+"""Decisions about calibrations: pages offer those that are possible, and explain why others are not."""
 
 import re
 

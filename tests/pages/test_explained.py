@@ -1,4 +1,4 @@
-"""What refusals and problems mean: a page for people, JSON for programs; and the ways between all pages."""
+"""Explanations of refusals and problems: pages for people, JSON for programs; and links between all pages."""
 
 import re
 

@@ -1,4 +1,4 @@
-"""How pages are laid out: on a phone, of many cameras, and before their pictures are there."""
+"""Layout of pages: on a phone, of many cameras, and before their pictures are loaded."""
 
 import itertools
 
@@ -10,7 +10,6 @@ from tests.pages.browsing import tab, wait_until
 from tests.pages.newcomer import describe_a_camera
 
 PHONE = {"width": 390, "height": 844}
-MANY = ("a", "b", "c", "d", "e", "f")
 
 
 @pytest.fixture
@@ -21,7 +20,7 @@ def phone(stub, people):
 
 
 def inside(page, part):
-    """Whether somebody sees all of it without scrolling anything sideways."""
+    """True if all of a part is visible without scrolling sideways."""
     box = part.bounding_box()
     return box["x"] >= 0 and box["x"] + box["width"] <= PHONE["width"]
 
