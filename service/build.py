@@ -1,4 +1,4 @@
-"""What this program was built from: its version, the commit of its clone, and what installs a part that it lacks."""
+"""Version and commit of this program, and commands that install its optional parts."""
 
 from __future__ import annotations
 
@@ -15,34 +15,34 @@ COMMIT = HERE / "commit.txt"
 
 
 def version() -> str:
-    """The version of the release."""
+    """Return the version of the release."""
     return metadata.version(PACKAGE)
 
 
 @cache
 def commit() -> str | None:
-    """The commit, of a wheel that it was built from, or of the clone that this runs in; None: nobody knows."""
+    """Return the commit that the wheel was built from, or of the clone that this runs in; None if unknown."""
     if COMMIT.is_file():
         return COMMIT.read_text().strip() or None
     if not (HERE.parent / ".git").exists():
         return None
-    asked = ["git", "-C", str(HERE), "rev-parse", "HEAD"]
+    command = ["git", "-C", str(HERE), "rev-parse", "HEAD"]
     try:
-        return subprocess.run(asked, capture_output=True, text=True, check=True, timeout=5).stdout.strip()
+        return subprocess.run(command, capture_output=True, text=True, check=True, timeout=5).stdout.strip()
     except (OSError, subprocess.SubprocessError):
         return None
 
 
 def description() -> str:
-    """Both, for people: `0.2.0 (commit 76a150ef32b1)`."""
+    """Return version and commit for people: `0.2.0 (commit 76a150ef32b1)`."""
     known = commit()
     return version() if known is None else f"{version()} (commit {known[:12]})"
 
 
 def install_command(extra: str, python: str = "python") -> str:
-    """Return the command that installs the packages of an extra beside this program, whose interpreter is `python`.
+    """Return the command that installs the packages of an extra for this interpreter (`python`).
 
-    It names these packages and not the extra: this project is on no index, and anybody may claim its name there.
+    It names the packages and not the extra: this project is on no index, and anybody could claim its name there.
     """
     declared = [text.partition(";") for text in metadata.requires(PACKAGE) or ()]
     packages = [name.strip() for name, _, marker in declared if f'extra == "{extra}"' in marker.replace("'", '"')]

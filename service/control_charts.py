@@ -1,4 +1,4 @@
-"""Control charts of a series that is measured once a night: has its mean moved beyond what its own spread explains?
+"""Control charts of a series that is measured once a night, which detect a shift of its mean.
 
 Two charts of the standardised values, both two-sided, as in Montgomery, *Introduction to Statistical Quality Control*:
 the exponentially weighted moving average (EWMA), which shows where the mean is now, and the tabular cumulative sum
@@ -15,18 +15,18 @@ from itertools import combinations_with_replacement
 from statistics import median
 
 WEIGHT, LIMIT_SIGMA = 0.2, 3.0
-"""Of the EWMA: λ, and the width L of its limits."""
+"""Parameters of the EWMA: λ, and the width L of its limits."""
 SLACK_SIGMA, DECISION_SIGMA = 0.5, 5.0
-"""Of the CUSUM: k, half the shift that it is to find, and h, at which it rings."""
+"""Parameters of the CUSUM: k, half the shift to detect, and h, its limit."""
 NIGHTS_OF_BASELINE = 20
-"""After so many nights it is settled what is usual."""
+"""First nights, which make the baseline."""
 MAD_TO_SIGMA = 1.4826
-"""By which the median distance from the median is one standard deviation of a normal distribution."""
+"""Ratio of standard deviation to median absolute deviation in a normal distribution."""
 
 
 @dataclass(frozen=True)
 class Night:
-    """A value and what is stated of how well it repeats: one standard deviation, of the value's unit."""
+    """A value and its stated repeatability: one standard deviation, in the value's unit."""
 
     value: float
     sigma: float
@@ -34,10 +34,10 @@ class Night:
 
 @dataclass(frozen=True)
 class Baseline:
-    """What is usual: the centre of the values, and the `extra` spread that they have beyond what is stated of each.
+    """Baseline of a series: the centre of its values, and the `extra` spread that they have beyond the stated one.
 
-    `extra` is what wind and heat do, which no single night knows of. `unsure`: one standard deviation of the centre, in
-    those of a night: it is an estimate, and taken for exact it would make charts ring three times as often.
+    `extra` is the effect of wind and heat, which no single night shows. `unsure`: one standard deviation of the centre,
+    as a part of a night's: without it, false alarms would be three times as frequent.
     """
 
     centre: float
@@ -46,7 +46,7 @@ class Baseline:
 
     @classmethod
     def of(cls, nights: Sequence[Night]) -> Baseline:
-        """Estimate it from the first nights, robustly: a few that are far off do not move it."""
+        """Estimate the baseline from the first nights, robust against outliers."""
         first = nights[:NIGHTS_OF_BASELINE]
         values = [night.value for night in first]
         centre = hodges_lehmann(values)
@@ -55,17 +55,17 @@ class Baseline:
         return cls(centre, math.sqrt(max(spread**2 - stated**2, 0.0)), 1 / math.sqrt(len(first)))
 
     def spread(self, night: Night) -> float:
-        """One standard deviation that the value of a night may be off the centre by, never below the stated one."""
+        """Return one standard deviation of a night's value around the centre, at least the stated one."""
         return math.hypot(night.sigma, self.extra)
 
 
 @dataclass(frozen=True)
 class ChartPoint:
-    """Where both charts stand after a night, in standard deviations from the centre.
+    """State of both charts after a night, in standard deviations from the centre.
 
-    `standardised`: the value itself; `limit`: of the EWMA's distance from 0, wider from night to night; `high` and
-    `low`: the CUSUM's upward and downward sums, both 0 or more; `since`: the number of the night after which the larger
-    of them has been above 0, where the shift seems to have begun; None while both are 0.
+    `standardised`: the value itself; `limit`: limit of the EWMA, which widens from night to night; `high` and `low`:
+    the CUSUM's upward and downward sums, 0 or more; `since`: index of the night since which the larger sum has been
+    above 0, the estimated beginning of the shift; None while both are 0.
     """
 
     standardised: float
@@ -87,12 +87,12 @@ class ChartPoint:
 
     @property
     def is_beyond(self) -> bool:
-        """True while either chart says that the mean has moved."""
+        """True while either chart is beyond its limit."""
         return self.is_beyond_ewma or self.is_beyond_cusum
 
 
 def charted(nights: Iterable[Night | None], baseline: Baseline) -> Iterator[ChartPoint | None]:
-    """Both charts after each night, in order; a night without a value (None) leaves them as they are."""
+    """Yield the state of both charts after each night; None for a night without a value."""
     ewma = high = low = 0.0
     high_since = low_since = measured = 0
     for number, night in enumerate(nights):
@@ -110,15 +110,15 @@ def charted(nights: Iterable[Night | None], baseline: Baseline) -> Iterator[Char
 
 
 def ewma_limit(nights: int, unsure: float = 0.0) -> float:
-    """How far from 0 an EWMA of independent values of standard deviation 1 may be after so many of them.
+    """Return the limit of an EWMA of independent values of standard deviation 1 after so many nights.
 
-    `unsure`: the standard deviation of what they are counted from.
+    `unsure`: standard deviation of the centre.
     """
     return LIMIT_SIGMA * math.sqrt(WEIGHT / (2 - WEIGHT) * (1 - (1 - WEIGHT) ** (2 * nights)) + unsure**2)
 
 
 def hodges_lehmann(values: Sequence[float]) -> float:
-    """The median of the means of all pairs: robust as a median, nearly as exact as a mean.
+    """Return the median of the means of all pairs: robust as a median, nearly as exact as a mean.
 
     Hodges and Lehmann, "Estimates of Location Based on Rank Tests", 1963.
     """
@@ -126,5 +126,5 @@ def hodges_lehmann(values: Sequence[float]) -> float:
 
 
 def _above_zero(spread: float) -> float:
-    # A value without any spread is off by nothing or by everything.
+    # A series without any spread would divide by zero.
     return max(spread, 1e-12)

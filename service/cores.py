@@ -1,6 +1,6 @@
-"""How many cores this process may use: those of the machine, less what others keep it from.
+"""Number of cores that this process may use, by affinity and by the quotas of its control groups.
 
-A container that may use two of 64 cores and starts 64 threads has each of them stopped for most of its time.
+A container that may use two of 64 cores and starts 64 threads has each of them throttled most of the time.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ MINE, GROUPS = Path("/proc/self/cgroup"), Path("/sys/fs/cgroup")
 
 
 def usable_cores(mine: Path = MINE, groups: Path = GROUPS) -> int:
-    """Whole cores, at least one: by affinity, and by the quotas of the control groups that the process is in."""
+    """Return the number of whole usable cores, at least one."""
     try:
         cores = len(os.sched_getaffinity(0))
     except AttributeError:  # not Linux
@@ -22,7 +22,7 @@ def usable_cores(mine: Path = MINE, groups: Path = GROUPS) -> int:
 
 
 def _quotas(mine: Path, groups: Path) -> Iterator[float]:
-    """In cores, of the group and of all above it."""
+    """Yield the quotas of the process's control groups and of their parents, in cores."""
     for line in _read(mine).splitlines():
         _, controllers, path = line.split(":", 2)
         for group in (PurePosixPath(path), *PurePosixPath(path).parents):
@@ -36,7 +36,7 @@ def _quotas(mine: Path, groups: Path) -> Iterator[float]:
 
 
 def _quota(allowed: str = "", period: str = "") -> Iterator[float]:
-    # `max`, or -1 in version 1: as much as there is.
+    # `max`, or -1 in version 1, is no limit.
     if allowed.isdecimal() and period.isdecimal() and int(period):
         yield int(allowed) / int(period)
 

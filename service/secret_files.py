@@ -1,4 +1,4 @@
-"""Secrets that stand in files, as Docker and Kubernetes mount them: `NAME_FILE` names the file of the secret `NAME`."""
+"""Secrets in files, as Docker and Kubernetes mount them: `NAME_FILE` names the file of the secret `NAME`."""
 
 from __future__ import annotations
 
@@ -6,20 +6,20 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Literal
 
-# What the object store would read from the environment itself.
+# Credentials that the object store would read from the environment itself.
 BucketSecret = Literal["access_key_id", "secret_access_key", "session_token"]
 BUCKET_SECRETS: tuple[BucketSecret, ...] = ("access_key_id", "secret_access_key", "session_token")
 
 
 class SecretFileError(ValueError):
-    """A secret is given twice, or its file gives none; the message says which, and never what is in it."""
+    """Raised for a secret that is given twice, or whose file is unreadable or empty; the message never contains it."""
 
 
 def read_secret(name: str, given: Mapping[str, str | None]) -> str | None:
     """Return the secret in the file that `NAME_FILE` names, without its line end; None where no file is named.
 
-    `given`: variables by name. Raises `SecretFileError` where the secret stands in a variable of its own as well, and
-    where the file cannot be read or is empty.
+    `given`: environment variables. Raises `SecretFileError` if the variable `name` is set, too, or the file cannot be
+    read or is empty.
     """
     file = given.get(f"{name}_FILE")
     if not file:
@@ -38,6 +38,6 @@ def read_secret(name: str, given: Mapping[str, str | None]) -> str | None:
 
 
 def bucket_credentials(given: Mapping[str, str | None]) -> dict[BucketSecret, str]:
-    """Return the credentials of an S3 bucket that stand in files, by the names that the object store has for them."""
+    """Return the credentials of an S3 bucket that are in files, by the object store's names."""
     found = {name: read_secret(f"AWS_{name.upper()}", given) for name in BUCKET_SECRETS}
     return {name: secret for name, secret in found.items() if secret is not None}

@@ -24,7 +24,7 @@ from service import cores
 from service.secret_files import read_secret
 from service.variable_names import PREFIX, unread
 
-# Without SQLAlchemy and obstore: the commands of the client read settings too, and start quickly.
+# Checked without SQLAlchemy and obstore: commands of the client read settings, too, and must start quickly.
 DATABASE_URL = re.compile(r"sqlite://.*|postgresql(\+psycopg)?://[^/]*/[^/?]+(\?.*)?")
 FREED_ANGLES = " ".join(rf"-?{angle}([+-]\d{{1,3}}(\.\d+)?)?" for angle in ("pan", "tilt", "roll"))
 FREED_AXES = re.compile(rf"(-?[xyz] ){{3}}{FREED_ANGLES}")
@@ -34,13 +34,13 @@ HOST_PATTERN = re.compile(r"(?=.*[A-Za-z*])[A-Za-z0-9*._-]+")
 ADDRESS_PATTERN = re.compile(r"(?=.*\d)(?=.*\*)[\d.*-]+")
 ROOT_PATH = re.compile(r"(/[A-Za-z0-9_~-][A-Za-z0-9._~-]*)*")
 BLOB_URL = re.compile(r"(file|s3)://.+")
-# Settings that may stand in a file each, which ESC_..._FILE names.
+# Secret settings, which may be in a file that ESC_..._FILE names.
 SECRETS = ("database_url", "webhook_secret")
 MODEL_BESIDE_THE_CODE = Path(__file__).resolve().parent.parent / "models" / "unet.onnx"
 
 
 class Settings(BaseSettings):
-    """What an operator may change. Sizes in megabytes are 10^6 bytes, times are in seconds."""
+    """Settings of service and worker. A megabyte is 10^6 bytes; times are in seconds."""
 
     model_config = SettingsConfigDict(
         env_prefix=PREFIX, env_file=".env", env_ignore_empty=True, extra="ignore", hide_input_in_errors=True
@@ -55,8 +55,8 @@ class Settings(BaseSettings):
     )
     sqlite_on_network: bool = Field(
         default=False,
-        description="`true`: SQLite may lie on a network file system (NFS, SMB and the like), which is refused "
-        "otherwise. For API and worker of one machine alone.",
+        description="`true`: allow SQLite on a network file system (NFS, SMB), only if API and worker run on one "
+        "machine.",
     )
     blob_url: str | None = Field(
         None,
@@ -72,79 +72,77 @@ class Settings(BaseSettings):
     port: int = Field(8000, ge=0, le=65535, description="Port to listen on; 0 takes a free one and prints it.")
     root_path: str = Field(
         "",
-        description="Path below which a proxy shows the service: `/esc` for https://truck.example.com/esc/. Pages, "
-        "redirects, the cookie and `/openapi.json` have it; the proxy may leave it on requests or take it off.",
+        description="Path below which a proxy serves the service: `/esc` for https://truck.example.com/esc/. Pages, "
+        "redirects, the cookie and `/openapi.json` include it; the proxy may strip it from requests or not.",
     )
     auth: Literal["auto", "off"] = Field(
         "auto",
-        description="`auto`: callers need a key as soon as there is one, and always beyond this machine. `off`: anyone "
-        "may call, from anywhere.",
+        description="`auto`: callers need an API key as soon as one exists, and always if `ESC_HOST` is open to other "
+        "machines. `off`: anyone may call, from anywhere.",
     )
     allowed_hosts: list[str] = Field(
         [],
-        description="Names under which a service that asks for no keys may be called, beside addresses and "
+        description="Host names by which a service without keys may be called, besides IP addresses and "
         '`localhost`: `["esc.truck.lan"]`.',
     )
     session_hours: float = Field(12, gt=0, description="Hours after which a browser has to sign in again.")
     rate_per_s: float = Field(
-        250, gt=0, description="Requests a second of one key to one API process; raise it with `ESC_QUEUE_LIMIT`."
+        250, gt=0, description="Requests per second of one key to one API process; raise it with `ESC_QUEUE_LIMIT`."
     )
-    rate_burst: int = Field(500, ge=1, description="Requests of one key at once, after a pause.")
+    rate_burst: int = Field(500, ge=1, description="Requests of one key in a burst.")
 
     # What a client may send.
-    max_body_mb: float = Field(
-        256, gt=0, description="Size of an upload; a body that is no upload may have 1 MB at most."
-    )
+    max_body_mb: float = Field(256, gt=0, description="Largest size of an upload; other bodies may have 1 MB at most.")
     uploads_at_once: int = Field(
         16,
         ge=1,
-        description="Uploads that one API process takes at the same time. More are answered with 503, and one for "
-        "which there is no room in `TMPDIR` (`/tmp`), where uploads lie while they arrive, with 507.",
+        description="Uploads that one API process takes at the same time. Further ones are answered with 503; one for "
+        "which `TMPDIR` (`/tmp`) has no room while it arrives, with 507.",
     )
     uploads_mb: float = Field(
         1000,
         gt=0,
-        description="Size of those uploads together. One beyond it is answered with 503 before it is read, unless it "
-        "is the only one. At most 150 MB of them are in memory.",
+        description="Total size of those uploads. One beyond it is answered with 503 before it is read, unless it is "
+        "the only one. At most 150 MB of them are in memory.",
     )
     connections: int = Field(
         4000,
         ge=1,
-        description="Clients that are connected to one API process. Beyond it those that have been silent for longest "
-        "make room. Each is an open file: what the limit of open files (`LimitNOFILE`, `ulimits`, `ulimit -Hn`) does "
-        "not allow is logged at the start, and fewer clients are let in.",
+        description="Clients that may be connected to one API process. Beyond it, the longest idle ones "
+        "are disconnected. Each is an open file: if the limit of open files (`LimitNOFILE`, `ulimits`, `ulimit -Hn`) "
+        "is lower, fewer clients are admitted, and the log says so at the start.",
     )
     followers: int = Field(
-        1000, ge=1, description="Clients that follow venues at one API process at once; more are answered with 503."
+        1000, ge=1, description="Clients that may follow venues at one API process; more are answered with 503."
     )
     waiters: int = Field(
         1000,
         ge=1,
-        description="Clients that wait for jobs (`?wait=`, `/jobs/{id}/events`) at one API process at once; more are "
+        description="Clients that may wait for jobs (`?wait=`, `/jobs/{id}/events`) at one API process; more are "
         "answered with 503.",
     )
-    max_frame_mb: float = Field(48, gt=0, description="Size of one frame or photo.")
+    max_frame_mb: float = Field(48, gt=0, description="Largest size of one frame or photo.")
     max_frame_pixels: int = Field(64_000_000, gt=0, description="Pixels of one frame, checked before it is decoded.")
     max_job_pixels: int = Field(
         500_000_000,
         gt=0,
-        description="Pixels of all frames of one job together, kept decoded; 500 million are 60 frames of 4K.",
+        description="Pixels of all frames of one job, which are kept decoded; 500 million are 60 frames of 4K.",
     )
     job_memory_mb: float = Field(
         6000,
         gt=0,
-        description="Memory of one program that decodes frames, on Linux and with `ESC_PROVIDER` other than `cuda`: "
-        "one that needs more ends in words, and takes nothing from the others. `ESC_MAX_JOB_PIXELS` need 4500.",
+        description="Memory limit of one program that decodes frames, on Linux and unless `ESC_PROVIDER` is `cuda`: a "
+        "job that needs more fails with a message, without harm to others. `ESC_MAX_JOB_PIXELS` needs 4500.",
     )
     max_frames_per_camera: int = Field(16, ge=1, description="Frames of one camera in one job, which are fused.")
     stall_timeout_s: float = Field(
         20,
         gt=0,
-        description="A client that owes bytes and sends or takes none for so long is disconnected, as is one whose "
-        "request head is not whole by then.",
+        description="Disconnect clients that should send or receive bytes and make no progress for this long, or whose "
+        "request head is incomplete by then.",
     )
     request_timeout_s: float = Field(
-        600, gt=0, description="Time within which a body must have arrived, and an answer have been taken."
+        600, gt=0, description="Time limit for receiving a body, and for sending an answer."
     )
     max_photos: int = Field(100, ge=1, description="Photos of a board in one `POST /intrinsics`.")
     queue_limit: int = Field(100, ge=1, description="Jobs that may wait; more are answered with 429.")
@@ -152,45 +150,46 @@ class Settings(BaseSettings):
     # Frames that the service fetches itself.
     sources: list[str] = Field(
         [],
-        description="Hosts of cameras that frames may be fetched from, for API and workers: names with wildcards, and "
+        description="Hosts that frames may be fetched from, for API and workers: names with wildcards, and "
         'networks: `["*.cams.lan", "10.1.0.0/16"]`. Empty: none.',
     )
     source_timeout_s: float = Field(
-        15, gt=0, le=120, description="Time for the frames of a venue, all cameras at once."
+        15, gt=0, le=120, description="Time limit for fetching the frames of a venue, all cameras in parallel."
     )
     source_program: list[str] = Field(
         [sys.executable, "-P", "-m", "worker.programs.snapshot"],
-        description="Program that fetches frames, beside API and worker.",
+        description="Program that fetches frames, started by API and worker.",
     )
 
     # Poses in other formats.
     freed_axes: str = Field(
         "x y z pan tilt roll",
-        description="What FreeD packets carry as X, Y, height, pan, tilt, roll: `y -x z -pan+90 tilt roll`.",
+        description="Content of X, Y, height, pan, tilt, roll in FreeD packets, such as `y -x z -pan+90 tilt roll`.",
     )
     map_program: list[str] = Field(
         [sys.executable, "-P", "-m", "worker.programs.stmap"],
-        description="Program that computes ST maps, beside the API; called with their origin.",
+        description="Program that computes ST maps, started by the API with their origin.",
     )
     pose_program: list[str] = Field(
         [sys.executable, "-P", "-m", "worker.programs.clicked_pose"],
-        description="Program that finds a first pose while its points are being clicked, beside the API.",
+        description="Program that finds a first pose while its points are being clicked, started by the API.",
     )
 
     # Pictures and stitched views.
     picture_program: list[str] = Field(
         [sys.executable, "-P", "-m", "worker.programs.draw"],
-        description="Program that draws pictures when somebody first looks at them, beside the API.",
+        description="Program that draws pictures when they are first requested, started by the API.",
     )
     stitch_program: list[str] = Field(
         [sys.executable, "-P", "-m", "worker.programs.stitch"],
-        description="Program that makes packages and previews of stitched views, beside the API, one of each at once.",
+        description="Program that makes packages and previews of stitched views, started by the API, one of each at a "
+        "time.",
     )
     pictures_at_once: int = Field(
         2,
         ge=1,
-        description="Pictures that one API process has drawn at the same time. Who asks for more waits, and is "
-        "answered with 503 after 20 s.",
+        description="Pictures that one API process draws at the same time. Further requests wait, and are answered "
+        "with 503 after 20 s.",
     )
 
     # The worker.
@@ -206,16 +205,16 @@ class Settings(BaseSettings):
     )
     provider: Literal["cpu", "cuda", "openvino"] = Field(
         "cpu",
-        description="What runs the network. `cuda` and `openvino` need `onnxruntime-gpu` or `onnxruntime-openvino` in "
-        "place of `onnxruntime`.",
+        description="Runtime of the network. `cuda` and `openvino` need `onnxruntime-gpu` or `onnxruntime-openvino` "
+        "instead of `onnxruntime`.",
     )
     threads: int = Field(
         default_factory=cores.usable_cores,
         ge=1,
-        description="Threads of a job, for inference and pictures. The default goes by affinity (`taskset`) and by the "
-        "quota of the container or unit. Results do not depend on it.",
+        description="Threads of a job, for inference and pictures. The default respects CPU affinity (`taskset`) and "
+        "the CPU quota of the container or unit. Results do not depend on it.",
     )
-    job_timeout_s: float = Field(600, gt=0, description="Time limit of jobs that name none (`timeout_s`).")
+    job_timeout_s: float = Field(600, gt=0, description="Time limit of jobs without `timeout_s`.")
     job_program: list[str] = Field(
         [sys.executable, "-P", "-m", "worker.jobs.program"],
         description="Program that computes one job: it reads the job and its frames on standard input, writes result "
@@ -227,8 +226,8 @@ class Settings(BaseSettings):
     drain_s: float = Field(
         25,
         ge=0,
-        description="Time that running jobs have to end when their worker is stopped; then they go back into the "
-        "queue. Keep `TimeoutStopSec` and `stop_grace_period` longer.",
+        description="Time that running jobs have to end when their worker is stopped; then they return to the queue. "
+        "Keep `TimeoutStopSec` and `stop_grace_period` longer.",
     )
 
     # What is kept, counted from the end of a job.
@@ -247,35 +246,31 @@ class Settings(BaseSettings):
     keep_revisions_years: float = Field(
         5,
         ge=1,
-        description="Years that poses are kept which a calibration brought by itself; those that somebody put, "
-        "accepted or restored stay.",
+        description="Years that poses of automatic calibrations are kept; poses that somebody set, accepted or "
+        "restored stay.",
     )
     keep_events_days: float = Field(
-        3, ge=2, description="Days that events of venues are kept: who follows a venue may come back within them."
+        3, ge=2, description="Days that events of venues are kept for clients that reconnect."
     )
-    keep_live_days: float = Field(
-        7, ge=1, le=7, description="Days that it is kept by the minute how live poses were doing."
-    )
-    min_free_mb: float = Field(
-        500, ge=0, description="Free room on the disk below which uploads are answered with 507."
-    )
-    tidy_every_s: float = Field(600, gt=0, description="Interval at which a worker deletes what is past its time.")
+    keep_live_days: float = Field(7, ge=1, le=7, description="Days that the history of live poses by minute is kept.")
+    min_free_mb: float = Field(500, ge=0, description="Free disk space below which uploads are answered with 507.")
+    tidy_every_s: float = Field(600, gt=0, description="Interval at which a worker deletes expired data.")
 
-    # Telling others of the end of a job.
+    # Callbacks.
     webhook_secret: SecretStr | None = Field(
         None,
-        description="Key that callbacks are signed with, without which `callback_url` is refused: `whsec_` and 24 "
-        "to 64 bytes in base64; two, separated by a space, while one replaces another. `ESC_WEBHOOK_SECRET_FILE` may "
-        "name a file that holds it.",
+        description="Key that signs callbacks, without which `callback_url` is refused: `whsec_` and 24 to 64 bytes in "
+        "base64; two keys, separated by a space, during a change of keys. `ESC_WEBHOOK_SECRET_FILE` may name a file "
+        "that holds it.",
     )
     callback_expires_days: float = Field(
         2,
         ge=1,
-        description="Age at which callbacks that were not delivered are given up, however often they were tried.",
+        description="Age at which undelivered callbacks are given up, however often they were tried.",
     )
-    callback_allow_http: bool = Field(False, description="Whether callbacks may go to `http` addresses too.")
+    callback_allow_http: bool = Field(False, description="Allow callbacks to `http` addresses, too.")
     callback_allow_private: bool = Field(
-        False, description="Whether callbacks may go to all private, loopback and link-local addresses."
+        False, description="Allow callbacks to all private, loopback and link-local addresses."
     )
     callbacks: list[str] = Field(
         [],
@@ -283,11 +278,11 @@ class Settings(BaseSettings):
         'names with wildcards, and networks: `["mixer.truck.lan", "10.2.0.0/24"]`.',
     )
 
-    # Being watched.
-    log_format: Literal["json", "console"] = Field("json", description="Form of the log; `console` is for people.")
+    # Logs and metrics.
+    log_format: Literal["json", "console"] = Field("json", description="Format of the log; `console` is for people.")
     log_level: Literal["debug", "info", "warning", "error"] = Field("info", description="Least level that is logged.")
     metrics_venues: int = Field(
-        500, ge=0, description="Venues with figures of their own in `/metrics`: those with the worst stitch errors."
+        500, ge=0, description="Venues with metrics of their own in `/metrics`: those with the worst stitch errors."
     )
 
     @classmethod
@@ -299,13 +294,13 @@ class Settings(BaseSettings):
         dotenv_settings: PydanticBaseSettingsSource,
         file_secret_settings: PydanticBaseSettingsSource,  # noqa: ARG003
     ) -> tuple[PydanticBaseSettingsSource, ...]:
-        """Read secrets from the files that variables name, too."""
+        """Also read secrets from the files that variables name."""
         return init_settings, env_settings, dotenv_settings, _SecretFiles(settings_cls, env_settings, dotenv_settings)
 
     @field_validator("database_url")
     @classmethod
     def _is_of_a_database(cls, url: str | None) -> str | None:
-        # What was given may hold a password: it is not repeated.
+        # The error does not repeat the URL, which may hold a password.
         if url is not None and not DATABASE_URL.fullmatch(url):
             raise ValueError("expected is postgresql://user:password@host:5432/name or sqlite:////folder/esc.sqlite")
         return url
@@ -364,32 +359,32 @@ class Settings(BaseSettings):
 
     @property
     def webhook_keys(self) -> list[bytes]:
-        """What callbacks are signed with; none: callbacks are refused."""
+        """Keys that callbacks are signed with; empty: callbacks are refused."""
         return webhook_keys(self.webhook_secret)
 
     @property
     def home_database_url(self) -> str:
-        """The database that is used."""
+        """Address of the database."""
         return self.database_url or f"sqlite:///{self.data.absolute() / 'esc.sqlite'}"
 
     @property
     def home_blob_url(self) -> str:
-        """The object store that is used."""
+        """Address of the object store."""
         return self.blob_url or (self.data.absolute() / "blobs").as_uri()
 
     @property
     def native_environment(self) -> dict[str, str]:
-        """What a process that computes needs in its environment before NumPy and OpenCV are loaded."""
+        """Environment variables that a computing process needs before it loads NumPy and OpenCV."""
         # Arrays as small as a population's gain nothing from BLAS threads; ONNX Runtime and OpenCV get `threads`.
-        single = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-        of_pixels = {"OPENCV_IO_MAX_IMAGE_PIXELS": str(self.max_frame_pixels)}
+        blas_threads = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+        most_pixels = {"OPENCV_IO_MAX_IMAGE_PIXELS": str(self.max_frame_pixels)}
         # Drivers of GPUs map the memory of the device, and reserve more than they use.
-        limit = {} if self.provider == "cuda" else {"ESC_JOB_MEMORY_MB": f"{self.job_memory_mb:g}"}
-        return {**single, **of_pixels, **limit}
+        memory = {} if self.provider == "cuda" else {"ESC_JOB_MEMORY_MB": f"{self.job_memory_mb:g}"}
+        return {**blas_threads, **most_pixels, **memory}
 
     @property
     def listens_beyond_this_machine(self) -> bool:
-        """Whether others can reach the port."""
+        """True if other machines can reach the port."""
         try:
             return not ipaddress.ip_address(self.host).is_loopback
         except ValueError:
@@ -397,20 +392,20 @@ class Settings(BaseSettings):
 
 
 def setting_names() -> set[str]:
-    """Return the variables that settings are read from, those that name the file of a secret among them."""
+    """Return the names of all variables that settings are read from, including `ESC_..._FILE`."""
     return {f"{PREFIX}{name.upper()}" for name in Settings.model_fields} | {
         f"{PREFIX}{name.upper()}_FILE" for name in SECRETS
     }
 
 
 def unread_variables() -> list[str]:
-    """Return the variables `ESC_...` of the environment and of `.env` that nothing reads: they are misspelt."""
+    """Return the misspelt variables `ESC_...` of the environment and of `.env`: nothing reads them."""
     sources = DotEnvSettingsSource(Settings), EnvSettingsSource(Settings)
     return unread((name for source in sources for name in source.env_vars), setting_names())
 
 
 class _SecretFiles(PydanticBaseSettingsSource):
-    """The files that `ESC_..._FILE` names, in the environment or in `.env`."""
+    """Source of settings: files that `ESC_..._FILE` names, in the environment or in `.env`."""
 
     def __init__(self, settings: type[BaseSettings], *variables: PydanticBaseSettingsSource) -> None:
         super().__init__(settings)
@@ -420,18 +415,18 @@ class _SecretFiles(PydanticBaseSettingsSource):
             self._given |= {name.upper(): value for name, value in source.env_vars.items() if value}
 
     def get_field_value(self, field: Any, field_name: str) -> tuple[Any, str, bool]:  # noqa: ARG002
-        """Find one secret."""
+        """Return a secret, with its name."""
         prefix = self.config.get("env_prefix", "")
         return read_secret(f"{prefix}{field_name.upper()}", self._given), field_name, False
 
     def __call__(self) -> dict[str, Any]:
-        """Find all secrets that stand in files."""
+        """Return all secrets that are in files."""
         found = {name: self.get_field_value(None, name)[0] for name in SECRETS}
         return {name: secret for name, secret in found.items() if secret is not None}
 
 
 def webhook_keys(secret: SecretStr | None) -> list[bytes]:
-    """The keys in a setting; the message of an error does not repeat them."""
+    """Return the keys in a setting. Errors do not repeat them."""
     keys = []
     for part in secret.get_secret_value().split() if secret else ():
         prefix, _, encoded = part.partition("_")

@@ -42,7 +42,7 @@ def tables() -> str:
 
 
 def _type(field: FieldInfo) -> str:
-    """What a value is, with its bounds: `number > 0`, `json or console`, `JSON list of texts`."""
+    """Return the type of a setting with its bounds: `number > 0`, `json or console`, `JSON list of texts`."""
     bounds = [f"{sign} {value}" for sign, value in _bounds(field)]
     return " ".join([_type_name(field.annotation), ", ".join(bounds)]).strip()
 

@@ -17,7 +17,7 @@ FOCAL_LENGTH_M = 60.0
 
 
 def displacement(across_m: float, away_m: float = 0.0, focal_length: float | None = 0.0, anchor: int | None = None):
-    """What a worker says of a camera."""
+    """Return the displacement of a camera as a worker reports it."""
     return Displacement(
         anchor=anchor,
         at=[-20.0, 34.0],

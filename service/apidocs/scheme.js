@@ -1,11 +1,11 @@
-// RapiDoc is told its theme: dark where the browser prefers that, and when it comes to.
+// Sets RapiDoc's theme to the browser's preferred colour scheme, also after a change.
 
 const dark = matchMedia("(prefers-color-scheme: dark)");
 const page = document.querySelector("rapi-doc");
 
 function dress() {
   page.setAttribute("theme", dark.matches ? "dark" : "light");
-  // Links and buttons: legible on either ground.
+  // Links and buttons: legible on both backgrounds.
   page.setAttribute("primary-color", dark.matches ? "#66bb6a" : "#2e7d32");
 }
 

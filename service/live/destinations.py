@@ -1,4 +1,4 @@
-"""Where poses are sent: datagrams to a renderer or a multicast group, and lines of JSON for programs."""
+"""Destinations of live poses: datagrams to a renderer or a multicast group, and lines of JSON for programs."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ from service.live.host_lookup import HostLookup
 from service.live.packets import datagrams
 from service.schemas.live import LiveClock
 
-# Groups of OpenTrackIO: 239.135.1.N is that of source number N.
+# Multicast groups of OpenTrackIO: 239.135.1.N for source number N.
 OPENTRACKIO_GROUP, OPENTRACKIO_PORT, MOST_SOURCES = "239.135.1.{number}", 55555, 200
-# As far as multicast goes unless somebody decides otherwise: not beyond the next router.
+# Multicast does not pass the next router.
 MULTICAST_TTL = 1
 
 
 @dataclass(frozen=True)
 class Tracked:
-    """How a pose is known that is tracked in pictures.
+    """Uncertainty and timing of a tracked pose.
 
-    `clock`: by which its time is told, the camera's (`rtcp`) or this machine's when the picture came (`arrival`);
-    `arrived_ns`: when the picture had been decoded, Unix time.
+    `clock`: clock of its time, the camera's (`rtcp`) or this machine's at the picture's arrival (`arrival`);
+    `arrived_ns`: Unix time at which the picture was decoded.
     """
 
     sigma_rotation_deg: float
@@ -41,11 +41,11 @@ class Tracked:
     arrived_ns: int
 
     def latency_ms(self) -> float:
-        """Return how long ago the picture arrived."""
+        """Return the time since the picture arrived."""
         return (time.time_ns() - self.arrived_ns) / 1e6
 
     def to_json(self) -> dict[str, object]:
-        """For who reads lines of JSON; the latency is from the picture's arrival until now."""
+        """Return the members of a line of JSON; the latency is measured now."""
         return {
             "sigma_rotation_deg": round(self.sigma_rotation_deg, 6),
             "sigma_position_m": round(self.sigma_position_m, 6),
@@ -56,7 +56,7 @@ class Tracked:
 
 @dataclass(frozen=True)
 class Sample:
-    """A camera at a moment. `tracked`: how that is known, unless it is the stored pose."""
+    """A camera's pose at a moment. `tracked`: None for a stored pose."""
 
     shot: NumberedCamera
     moment: opentrackio.SampleTime
@@ -64,16 +64,16 @@ class Sample:
 
 
 class Destination(Protocol):
-    """Takes the samples of all cameras of a moment, in the order of the venue."""
+    """Receiver of the samples of all cameras of a moment, in the order of the venue."""
 
     def send(self, samples: Sequence[Sample]) -> None:
-        """Send them on. Raises `OSError` where the network does not take them."""
+        """Send the samples. Raises `OSError` if the network does not take them."""
 
 
 class UdpSocket:
-    """Sends datagrams by IPv4 or IPv6, to multicast groups by the `interface` of this IPv4 address, if one is named.
+    """UDP sockets for IPv4 and IPv6, closed at the end of a `with` block.
 
-    To be used as a context, which closes it.
+    `interface`: IPv4 address of the network interface for multicast; None: the system's choice.
     """
 
     def __init__(self, interface: str | None = None) -> None:
@@ -82,7 +82,7 @@ class UdpSocket:
         self._interface = interface
 
     def send(self, datagram: bytes, host: str, port: int) -> None:
-        """Send a datagram; none goes out before the host was looked up. Raises `OSError`."""
+        """Send a datagram; it is dropped while the host's first look-up goes on. Raises `OSError`."""
         if (host, port) not in self._lookups:
             self._lookups[host, port] = HostLookup(host, port)
         found = self._lookups[host, port].address()
@@ -113,7 +113,7 @@ class UdpSocket:
 
 @dataclass(frozen=True)
 class OpenTrackIO:
-    """Samples of OpenTrackIO 1.0.1, to one address or, where none is given, to the group of each camera's number."""
+    """OpenTrackIO 1.0.1, to one address, or without `host` to the multicast group of each camera's number."""
 
     socket: UdpSocket
     host: str | None = None
@@ -121,7 +121,7 @@ class OpenTrackIO:
     _angles: opentrackio.SteadyAngles = field(default_factory=opentrackio.SteadyAngles, init=False)
 
     def send(self, samples: Sequence[Sample]) -> None:
-        """Send a sample of each camera, in as many datagrams as it takes."""
+        """Send a sample of each camera, split into datagrams."""
         for sample in samples:
             host = self.host or OPENTRACKIO_GROUP.format(number=sample.shot.number)
             content = opentrackio.write_moment(sample.shot, sample.moment, self._angles)
@@ -147,12 +147,12 @@ class FreeD:
 
 @dataclass(frozen=True)
 class JsonLines:
-    """A line of JSON for each camera, on a stream of text, whose reader nobody waits for."""
+    """A line of JSON for each camera on a text stream, without waiting for its reader."""
 
     stream: IO[str]
 
     def send(self, samples: Sequence[Sample]) -> None:
-        """Write a line for each camera. Raises `BrokenPipeError` where nobody reads any more."""
+        """Write a line for each camera. Raises `BrokenPipeError` if the reader has gone."""
         for sample in samples:
             moment, camera = sample.moment, sample.shot.camera
             line: dict[str, object] = {
@@ -167,7 +167,7 @@ class JsonLines:
                 line |= sample.tracked.to_json()
             if not self._has_room():
                 raise OSError("the program that reads the lines does not keep up")
-            # Line by line: one fits into what a pipe with any room takes at once, all of a moment need not.
+            # Line by line: a pipe with any room takes one line at once, but perhaps not all of a moment.
             print(json.dumps(line, separators=(",", ":")), file=self.stream, flush=True)
 
     def _has_room(self) -> bool:
@@ -175,21 +175,20 @@ class JsonLines:
 
 
 class PoseSender:
-    """Sends samples to all `destinations`, which have names, those of each camera numbered from 0.
+    """Sends samples to all `destinations`, by name; the samples of each camera are numbered from 0.
 
-    Several threads may call it. `told` gets the name of each destination with the error where the network does not take
-    samples, or None where it does; the next samples are sent all the same. A destination that nobody reads any more is
-    left out, and once none remains `ended` is called.
+    Thread-safe. `report` is called with the name of each destination and its error, or None after success; sending goes
+    on after errors. A destination whose reader has gone is removed; after the last one `ended` is called.
     """
 
     def __init__(
         self,
         destinations: Mapping[str, Destination],
-        told: Callable[[str, OSError | None], None],
+        report: Callable[[str, OSError | None], None],
         ended: Callable[[], None],
     ) -> None:
         self._destinations = dict(destinations)
-        self._told = told
+        self._report = report
         self._ended = ended
         self._numbers = Counter[str]()
         self._lock = threading.Lock()
@@ -202,7 +201,7 @@ class PoseSender:
         status: str,
         tracked: Tracked | None = None,
     ) -> None:
-        """Send a sample of each of these cameras; the other arguments as of `SampleTime` and `Sample`."""
+        """Send a sample of each of these cameras; other arguments: see `SampleTime` and `Sample`."""
         with self._lock:
             samples = [
                 Sample(shot, opentrackio.SampleTime(unix_ns, self._numbers[shot.id], rate, status), tracked)
@@ -218,10 +217,10 @@ class PoseSender:
         except BrokenPipeError as error:
             del self._destinations[name]
             if self._destinations:
-                self._told(name, error)
+                self._report(name, error)
             else:
                 self._ended()
         except OSError as error:
-            self._told(name, error)
+            self._report(name, error)
         else:
-            self._told(name, None)
+            self._report(name, None)

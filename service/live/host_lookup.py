@@ -1,4 +1,4 @@
-"""Addresses of the hosts that poses are sent to: a name is looked up beside the sending, which never waits for it."""
+"""Look-up of the hosts that poses are sent to, in a thread: sending never waits for a name server."""
 
 from __future__ import annotations
 
@@ -7,23 +7,22 @@ import threading
 import time
 from typing import Any
 
-# A renderer that got another address is sent to again after so long; no resolver minds the question.
+# A renderer with a new address is found after this time.
 LOOK_UP_AGAIN_S = 60.0
-# After a look-up that failed.
+# Pause after a failed look-up.
 FAILED_AGAIN_S = 5.0
-# A first look-up that goes on for longer is trouble; most take milliseconds, a resolver's own time-out is 5 s at least.
+# A longer first look-up is reported: most take milliseconds, and resolvers time out after 5 s at least.
 SLOW_S = 3.0
 
 
-# Family, and what `socket.sendto` takes.
+# Family, and the address for `socket.sendto`.
 SocketAddress = tuple[int, tuple[Any, ...]]
 
 
 class HostLookup:
-    """Knows the address of `host`, a name or an address, at a UDP port.
+    """The current address of `host`, a name or an IP address, at a UDP port.
 
-    A name is looked up in a thread of its own, again and again until `close`: a resolver may be silent for as long as
-    it is set to. The last answer holds.
+    A name is looked up in a thread, repeatedly until `close`; the last answer is used.
     """
 
     def __init__(self, host: str, port: int) -> None:
@@ -39,7 +38,7 @@ class HostLookup:
             threading.Thread(target=self._keep_looking_up, daemon=True).start()
 
     def address(self) -> SocketAddress | None:
-        """Return family and socket address; None while the first look-up goes on. Raises `OSError` where it fails."""
+        """Return family and socket address; None during the first look-up. Raises `OSError` if that failed."""
         if self._address is None:
             if self._error is not None:
                 raise OSError(self._error)
@@ -48,7 +47,7 @@ class HostLookup:
         return self._address
 
     def close(self) -> None:
-        """Look it up no more; nobody waits for a look-up that goes on."""
+        """Stop looking up, without waiting for the thread."""
         self._closed.set()
 
     def _keep_looking_up(self) -> None:
@@ -56,7 +55,7 @@ class HostLookup:
         while not self._closed.wait(pause_s):
             try:
                 self._address, pause_s = _look_up(self._host, self._port), LOOK_UP_AGAIN_S
-            # A label of a name that is empty or too long is a `UnicodeError`.
+            # An empty or too long label of a name raises `UnicodeError`.
             except (OSError, UnicodeError) as error:
                 self._error, pause_s = f"{self._host} cannot be looked up: {error}", FAILED_AGAIN_S
 

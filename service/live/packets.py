@@ -14,7 +14,7 @@ from collections.abc import Iterator
 IDENTIFIER, JSON = b"OTrk", 1
 HEADER = struct.Struct(">4sBBHIH")
 CHECKSUM = struct.Struct(">H")
-# What an Ethernet frame of 1500 bytes holds beside the headers of IPv4, UDP and OpenTrackIO: more would be fragmented.
+# Payload of an Ethernet frame of 1500 bytes after the headers of IPv4, UDP and OpenTrackIO: more would be fragmented.
 LARGEST_SEGMENT = 1500 - 20 - 8 - HEADER.size - CHECKSUM.size
 LAST_SEGMENT = 0x8000
 SEQUENCE_NUMBERS = 0x10000

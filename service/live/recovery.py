@@ -1,7 +1,7 @@
-"""What `esc live` does about tracked cameras that are lost: it asks the service for a calibration by their pictures.
+"""Recovery of lost cameras in `esc live`: it submits a calibration with their newest pictures.
 
-An accepted job moves the stored poses, which tracking begins anew from; a refused one changes nothing. Jobs take a
-worker for seconds to minutes and a picture may show what no job can find: the pause between two of them doubles.
+An accepted job moves the stored poses, from which tracking starts again; a rejected one changes nothing. A job keeps a
+worker busy for seconds to minutes and may never succeed: the pause between two jobs doubles.
 """
 
 from __future__ import annotations
@@ -23,52 +23,52 @@ from service.client import Client, NotUnderstood, Refused
 if TYPE_CHECKING:
     from service.schemas.job import Job
 
-# Between two looks whether a camera is lost.
+# Interval of the check for lost cameras.
 LOOK_EVERY_S = 1.0
-# A camera whose lines were not seen for so long is lost; players and a hand before the lens are gone by then.
+# A camera whose lines were not seen for this long is lost; players and a hand before the lens are gone by then.
 LOST_AFTER_S = 10.0
-# A camera of which no picture comes is waited for: its stream may have broken off for a moment.
+# Time to wait for a camera without pictures: its stream may have broken off for a moment.
 FRAMES_WITHIN_S = 30.0
-# From the end of a calibration until the next one begins, doubled each time that a camera is lost still.
+# Pause between two calibrations, doubled each time that a camera is still lost.
 FIRST_PAUSE_S, LONGEST_PAUSE_S = 180.0, 3600.0
 
 
 class LiveCameras(Protocol):
-    """The cameras that are tracked."""
+    """The tracked cameras."""
 
     def lost(self, for_s: float) -> Sequence[str]:
-        """Ids of cameras whose pictures come without their lines where expected, for longer than `for_s` seconds."""
+        """Return the ids of cameras whose pictures did not show the expected lines for `for_s` seconds."""
 
     def frames(self) -> Mapping[str, bytes] | None:
-        """Files of the newest pictures, by camera; none where not all cameras of the venue are tracked.
+        """Return the newest picture of each camera as a file; {} if not all cameras of the venue are tracked.
 
-        None while there is none of a camera that is tracked.
+        None while a tracked camera has no picture.
         """
 
 
 class RecoveryLog(Protocol):
-    """Is told how calibrations go, of which each names the cameras that were `lost`."""
+    """Log of the calibrations; `lost`: ids of the cameras that were lost."""
 
     def asked(self, lost: Sequence[str], job: Job) -> None:
-        """Take a job that was submitted."""
+        """Log a submitted job."""
 
     def ended(self, lost: Sequence[str], job: Job) -> None:
-        """Take the end of that job."""
+        """Log the end of a job."""
 
     def failed(self, lost: Sequence[str], error: Exception) -> None:
-        """Take why there is no job: the service refused it, or cannot be reached."""
+        """Log that the service refused a job, or cannot be reached."""
 
 
 @dataclass(frozen=True)
 class Recovery:
-    """Has the service calibrate a venue where cameras are lost."""
+    """Calibrates a venue while cameras are lost."""
 
     venue: str
     cameras: LiveCameras
     log: RecoveryLog
 
     def run(self, client: Client, stop: threading.Event) -> None:
-        """Look after them until `stop`."""
+        """Submit calibrations of lost cameras until `stop`."""
         ended_s, pause_s, lost_s = -math.inf, FIRST_PAUSE_S, math.inf
         while not stop.wait(LOOK_EVERY_S):
             now = time.monotonic()
@@ -76,7 +76,7 @@ class Recovery:
                 continue
             lost = self.cameras.lost(LOST_AFTER_S)
             if not lost:
-                # Nothing was lost when the pause was over: it begins anew.
+                # No camera is lost after the pause: the next pause is the first one again.
                 ended_s, pause_s, lost_s = -math.inf, FIRST_PAUSE_S, math.inf
                 continue
             lost_s = min(lost_s, now)
@@ -95,7 +95,7 @@ class Recovery:
                 for camera, content in frames.items():
                     files[camera] = Path(folder, f"{camera}.jpg")
                     files[camera].write_bytes(content)
-                # Without frames the service fetches them from the sources of the cameras, if they have any.
+                # Without files the service fetches frames from the sources of the cameras, if they have any.
                 job = client.calibrate(self.venue, files, {}, f"live-{uuid.uuid4()}")
             self.log.asked(lost, job)
             self.log.ended(lost, client.follow(job, lambda _: None, every_s=5.0))

@@ -1,7 +1,6 @@
-"""What `esc live` tells the service that its venue is from: how live poses are doing, twice a second.
+"""Reports of `esc live` to the service about its live poses, twice a second.
 
-Reports are counted together by the threads that send poses, and sent by a thread of their own: poses never wait for the
-service.
+The threads that send poses count them, and another thread sends the reports: poses never wait for the service.
 """
 
 from __future__ import annotations
@@ -26,14 +25,14 @@ from service.schemas.live import LatencyMs, LiveCameraIn, LiveReport, LiveSigma,
 from service.schemas.venue import Camera
 
 INTERVAL_S = 0.5
-# After a report that was not taken.
+# Pause after a failed report.
 AGAIN_S = 5.0
-# A camera of which no pose came for so long is sent as it is stored.
+# After this time without a tracked pose, the stored pose of a camera is sent.
 SILENT_S = 1.0
-# Lines may be looked for in every 25th picture alone, which is measuring all the same.
+# Lines may be measured in every 25th picture only, and the camera still counts as measured.
 MEASURED_WITHIN_S = 2.0
 LATENCY_OVER_S = 10.0
-# Of pictures: what became of those that were looked at.
+# Outcomes of tracking in a picture.
 OUTCOMES: tuple[LiveStatus, ...] = ("measured", "coasted", "refused")
 
 
@@ -41,8 +40,8 @@ OUTCOMES: tuple[LiveStatus, ...] = ("measured", "coasted", "refused")
 class SentPose:
     """A tracked pose that has just been sent.
 
-    `how`: it is known, one of `OUTCOMES`, and by what (`tracked`); `number`: of its picture in the stream; `taken_ns`:
-    when that was taken, Unix time in nanoseconds.
+    `how`: one of `OUTCOMES`; `number`: of its picture in the stream; `taken_ns`: Unix time of the picture in
+    nanoseconds.
     """
 
     camera: Camera
@@ -54,18 +53,18 @@ class SentPose:
 
 @dataclass
 class _TrackedCamera:
-    """What was sent of a camera: the last pose and when that was, and what has not been reported yet."""
+    """Last pose of a camera with its time, and counts that are not reported yet."""
 
     last: SentPose | None = None
     last_s: float = -math.inf
     measured_s: float = -math.inf
     counts: Counter[str] = field(default_factory=Counter)
-    # When each pose was sent, of `time.monotonic`, and how long after the arrival of its picture, in milliseconds.
+    # Time of each sent pose (`time.monotonic`), and its latency in milliseconds.
     latencies: deque[tuple[float, float]] = field(default_factory=deque)
 
     def add(self, pose: SentPose, now: float) -> None:
         """Count a pose that was sent `now`."""
-        # A stream that was opened again counts from 0.
+        # A stream that was reopened counts from 0.
         left_out = max(0, pose.number - self.last.number - 1) if self.last is not None else 0
         self.counts.update({"pictures": left_out + 1, "left_out": left_out, pose.how: 1})
         self.latencies.append((now, max(0.0, pose.tracked.latency_ms())))
@@ -75,13 +74,13 @@ class _TrackedCamera:
             self.measured_s = now
 
     def status(self, now: float) -> LiveStatus:
-        """How the camera is doing."""
+        """Return the status of the camera."""
         if self.last is None or now - self.last_s >= SILENT_S:
             return "silent"
         return "measured" if now - self.measured_s < MEASURED_WITHIN_S else self.last.how
 
     def latency_ms(self, now: float) -> LatencyMs | None:
-        """Return the latency of the poses that were sent lately."""
+        """Return the latency over the last `LATENCY_OVER_S` seconds; None without poses."""
         self._forget_latencies(now)
         sorted_ms = sorted(latency for _, latency in self.latencies)
         if not sorted_ms:
@@ -90,15 +89,15 @@ class _TrackedCamera:
         return LatencyMs(p50=p50, p99=p99)
 
     def _forget_latencies(self, now: float) -> None:
-        """Forget those of a while ago: of a venue that is a file nobody asks for them, for months."""
+        """Drop old latencies: nobody reads those of a venue from a file, which may be sent for months."""
         while self.latencies and now - self.latencies[0][0] > LATENCY_OVER_S:
             self.latencies.popleft()
 
 
 class LiveReporter:
-    """Counts what is sent of a venue's cameras and reports it. Several threads may call `sent`.
+    """Counts the sent poses of a venue and reports them to the service. `sent` is thread-safe.
 
-    `streams`: by camera the address that it is tracked in; `destinations`: where poses go, in words.
+    `streams`: address of the stream of each tracked camera; `destinations`: destinations of the poses, in words.
     """
 
     def __init__(self, poses: StoredPoses, streams: Mapping[str, str], destinations: Sequence[str]) -> None:
@@ -110,7 +109,7 @@ class LiveReporter:
         self._lock = threading.Lock()
 
     def running_others(self, state: LiveState) -> list[str]:
-        """Return host and pid of other processes that report of the venue at the moment, by what the service knows."""
+        """Return host and pid of other processes that report about the venue now, by the service's state."""
         me = socket.gethostname(), os.getpid(), self._started_at
         running = [(one.host, one.pid, one.started_at) for one in state.others if one.running]
         if state.running:
@@ -123,7 +122,7 @@ class LiveReporter:
             self._tracked[pose.camera.id].add(pose, time.monotonic())
 
     def report(self, *, stopped: bool = False) -> LiveReport:
-        """Return the report of now, with all that was not yet answered. `stopped`: it is the last one."""
+        """Return the current report, with all counts that were not acknowledged. `stopped`: it is the last one."""
         now = time.monotonic()
         stored = [shot.camera for shot in self._poses.at(now)]
         with self._lock:
@@ -138,27 +137,27 @@ class LiveReporter:
         )
 
     def answered(self, report: LiveReport) -> None:
-        """Count what a report said as told: it is not reported again."""
+        """Subtract the counts of an acknowledged report, so that they are not reported again."""
         with self._lock:
             for camera in report.cameras:
                 if camera.id in self._tracked:
-                    told = {name: getattr(camera, name) for name in ("pictures", "left_out", *OUTCOMES)}
-                    self._tracked[camera.id].counts.subtract(told)
+                    reported = {name: getattr(camera, name) for name in ("pictures", "left_out", *OUTCOMES)}
+                    self._tracked[camera.id].counts.subtract(reported)
 
     def run(
         self, client: Client, stop: threading.Event, failed: Callable[[str], None], taken: Callable[[], None]
     ) -> None:
-        """Report until `stop`, and a last time then. `failed`: a report was not taken, and why; `taken`: one was."""
+        """Report until `stop`, and then a last time. Calls `failed` with the reason, or `taken`, after each report."""
         pause_s = INTERVAL_S
         while not stop.wait(pause_s):
-            pause_s = INTERVAL_S if self._tell(client, failed, taken, stopped=False) else AGAIN_S
-        self._tell(client, failed, taken, stopped=True)
+            pause_s = INTERVAL_S if self._send(client, failed, taken, stopped=False) else AGAIN_S
+        self._send(client, failed, taken, stopped=True)
 
-    def _tell(self, client: Client, failed: Callable[[str], None], taken: Callable[[], None], *, stopped: bool) -> bool:
+    def _send(self, client: Client, failed: Callable[[str], None], taken: Callable[[], None], *, stopped: bool) -> bool:
         try:
             report = self.report(stopped=stopped)
             client.report_live(self._poses.venue.id, report)
-        # A pose that cannot be reported, far outside of the world, is a `ValueError`.
+        # A pose far outside of the world fails validation with a `ValueError`.
         except (Refused, NotUnderstood, httpx.HTTPError, ValueError) as error:
             failed(str(error))
             return False
@@ -175,7 +174,7 @@ class LiveReporter:
         counts = {name: tracked.counts[name] for name in ("pictures", "left_out", *OUTCOMES)}
         if last is None or status == "silent":
             return LiveCameraIn(id=stored.id, pose=_pose_in(stored.pose), **known, **counts)
-        # Loads OpenCV, for which stored poses do not wait.
+        # Imported late: loads OpenCV, which stored poses do not need.
         from service.store.movement import turned_deg
 
         sigma = LiveSigma(rotation_deg=last.tracked.sigma_rotation_deg, position_m=last.tracked.sigma_position_m)

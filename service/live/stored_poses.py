@@ -1,4 +1,4 @@
-"""Stored poses, sent again and again at the rate of the pictures, and moved to new ones as jobs are accepted."""
+"""Stored poses, sent repeatedly at the rate of the pictures, with smooth transitions to newly accepted ones."""
 
 from __future__ import annotations
 
@@ -15,23 +15,22 @@ from service.schemas.geometry import Pose
 from service.schemas.venue import Camera, Venue
 
 STORED = "stored"
-# A pose that changes by less is moved to over so many seconds, which nobody sees; what changes more was wrong, and is
-# right at once.
+# Smaller changes of a pose are spread over `MOVED_IN_S`, invisibly; larger ones were wrong poses, and apply at once.
 SMALL_TURN_RAD, SMALL_MOVE_M, MOVED_IN_S = math.radians(0.5), 0.1, 1.0
-# After a sleep of the machine the next samples are those of now, and not all that were missed.
+# After a sleep of the machine, missed samples beyond this are skipped.
 MOST_MISSED_S = 1.0
 
 
 @dataclass(frozen=True)
 class _Transition:
-    """A camera on its way from a pose to a newer one, since `begun`, of `time.monotonic`."""
+    """Transition of a camera to a newer pose, since `begun` (`time.monotonic`)."""
 
     before: Camera
     after: Camera
     begun: float
 
     def at(self, now: float) -> Camera:
-        """The camera at a time."""
+        """Return the camera at a time."""
         share = min((now - self.begun) / MOVED_IN_S, 1.0)
         if share == 1.0 or not _is_small_step(self.before, self.after):
             return self.after
@@ -53,7 +52,7 @@ def _is_small_step(before: Camera, after: Camera) -> bool:
 
 @dataclass
 class StoredPoses:
-    """The poses of a venue that hold at a time. `replace` may be called by another thread."""
+    """Poses of a venue over time. Thread-safe."""
 
     venue: Venue
     _transitions: dict[str, _Transition] = field(default_factory=dict, init=False)
@@ -63,7 +62,7 @@ class StoredPoses:
         self._transitions = {camera.id: _Transition(camera, camera, 0.0) for camera in self.venue.cameras}
 
     def replace(self, venue: Venue, now: float) -> list[str]:
-        """Move to the poses of a venue, from where the cameras are `now`. Return the cameras whose poses are new."""
+        """Begin transitions to the poses of a venue. Return the ids of cameras whose poses or lenses are new."""
         with self._lock:
             before = {camera: transition.at(now) for camera, transition in self._transitions.items()}
             stored = {camera: transition.after for camera, transition in self._transitions.items()}
@@ -77,7 +76,7 @@ class StoredPoses:
             return new
 
     def at(self, now: float) -> list[NumberedCamera]:
-        """The cameras at a time, of `time.monotonic`, in the order of the venue."""
+        """Return the cameras at a time (`time.monotonic`), in the order of the venue."""
         with self._lock:
             return [NumberedCamera(one.at(now), number) for number, one in enumerate(self._transitions.values(), 1)]
 
@@ -93,9 +92,9 @@ def send_stored_poses(
     stop: threading.Event,
     is_tracked: Callable[[str], bool] = lambda _: False,
 ) -> int:
-    """Send a sample of each camera `rate` times a second until `stop`; return how many times it was so far.
+    """Send a sample of each camera `rate` times a second until `stop`; return the number of beats.
 
-    The beat is that of the machine's clock and does not drift. A camera that is tracked in its pictures is left out.
+    The beat follows the machine's clock without drift. Tracked cameras are left out.
     """
     sent, begun, beats = 0, time.monotonic(), 0
     while not stop.is_set():

@@ -1,1 +1,1 @@
-"""What an operator watches: logs, metrics, traces, whether all is there, and room on the disk."""
+"""Logs, metrics, traces, readiness and free disk space, for the operator."""

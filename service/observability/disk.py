@@ -1,4 +1,4 @@
-"""Room on the disk: of the folders that the database and the files grow in, where those are on this machine."""
+"""Free disk space of the local folders in which database and files grow."""
 
 from __future__ import annotations
 
@@ -13,29 +13,29 @@ from service.settings import Settings
 
 
 class Disk:
-    """What is left of it. With a bucket and PostgreSQL there is nothing to watch, and always room."""
+    """Free space for database and files. With PostgreSQL and a bucket there is no local folder to watch."""
 
     def __init__(self, settings: Settings) -> None:
         self._folders = _growing(settings)
         self.min_free_bytes = int(settings.min_free_mb * 1e6)
 
     def free_bytes(self) -> int | None:
-        """What is free where least is; None if nothing grows here."""
+        """Return the free bytes of the fullest folder; None without local folders."""
         return min((shutil.disk_usage(folder).free for folder in self._folders), default=None)
 
     def is_short(self) -> bool:
-        """Whether less is free than must be."""
+        """True if less is free than the setting demands."""
         free = self.free_bytes()
         return free is not None and free < self.min_free_bytes
 
 
 def spool_folder() -> Path:
-    """Where the files of an upload lie while it arrives."""
+    """Return the folder of files of uploads that are arriving."""
     return Path(tempfile.gettempdir())
 
 
 def spool_free_bytes() -> int:
-    """What is free there."""
+    """Return the free bytes for arriving uploads."""
     return shutil.disk_usage(spool_folder()).free
 
 

@@ -1,4 +1,4 @@
-"""Logs: one event per line with its request or job, as JSON or for the eye."""
+"""Logs: one event per line with its request or job, as JSON or for the console."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from service.settings import Settings
 
 
 def configure(settings: Settings) -> None:
-    """Send structlog's and the standard library's records to stderr in one form."""
+    """Send the records of structlog and of the standard library to stderr in one format."""
     outages = OutageLines()
     shared: list[structlog.typing.Processor] = [
         structlog.contextvars.merge_contextvars,
@@ -24,7 +24,7 @@ def configure(settings: Settings) -> None:
     last: list[structlog.typing.Processor] = (
         [structlog.processors.format_exc_info, structlog.processors.JSONRenderer()]
         if settings.log_format == "json"
-        # Of what the frames of a traceback hold nothing is printed: there are passwords in it, and it takes seconds.
+        # Tracebacks without local variables: these contain passwords, and printing them takes seconds.
         else [
             structlog.dev.ConsoleRenderer(colors=sys.stderr.isatty(), exception_formatter=structlog.dev.plain_traceback)
         ]
@@ -33,7 +33,7 @@ def configure(settings: Settings) -> None:
     structlog.configure(
         processors=[*shared, outages.structured, *last],
         wrapper_class=structlog.make_filtering_bound_logger(level),
-        logger_factory=structlog.WriteLoggerFactory(cast(TextIO, _AsFarAsItTakes(sys.stderr))),
+        logger_factory=structlog.WriteLoggerFactory(cast(TextIO, _BestEffortStream(sys.stderr))),
     )
     handler = logging.StreamHandler(sys.stderr)
     handler.setFormatter(
@@ -44,13 +44,13 @@ def configure(settings: Settings) -> None:
     )
     handler.addFilter(outages.filter)
     logging.basicConfig(handlers=[handler], level=max(level, logging.WARNING), force=True)
-    # The engine of the queue brings a console handler of its own.
+    # DBOS installs a console handler of its own.
     logging.getLogger("dbos").handlers = [logging.NullHandler()]
     logging.getLogger("dbos").propagate = True
 
 
-class _AsFarAsItTakes:
-    """A stream for lines that may be lost: what they tell of must not fail because the disk they go to is full."""
+class _BestEffortStream:
+    """A stream that drops lines it cannot write: work must not fail because the disk of the log is full."""
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream

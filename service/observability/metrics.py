@@ -1,7 +1,7 @@
-"""What Prometheus reads.
+"""Metrics for Prometheus.
 
-Requests are counted by the process that answers them. All else is read from the database at the moment it is asked for,
-so it is the same whichever API process is asked, however many workers there are and however often they were restarted.
+Each process counts the requests that it answers. Everything else is read from the database at each scrape, so that
+every API process shows the same, and restarts of workers lose nothing.
 """
 
 from __future__ import annotations
@@ -40,52 +40,52 @@ from service.store.trends import CameraTrend
 from service.store.unreadable import RowKind, unreadable_rows
 from service.store.workers import WorkerHeartbeat
 
-# Name, meaning and figure; a figure that is not known is no sample.
+# Name, help and value of gauges; an unknown value (None) makes no sample.
 OF_VENUES: tuple[tuple[str, str, Callable[[VenueGauges], float | None]], ...] = (
     (
         "esc_venue_stitch_error_pixels",
-        "Of the poses that hold, by the last result; 1 px is 10 cm.",
+        "Stitch error of the current poses, by the last result; 1 px is 10 cm.",
         lambda venue: venue.stitch_error_px,
     ),
-    ("esc_venue_moved_pixels", "How far the last result found its worst camera moved.", lambda venue: venue.moved_px),
-    ("esc_venue_drift_pixels", "How far its worst camera is from where it was put.", lambda venue: venue.drift_px),
+    ("esc_venue_moved_pixels", "Largest movement of a camera in the last result.", lambda venue: venue.moved_px),
+    ("esc_venue_drift_pixels", "Largest movement of a camera since its pose was set.", lambda venue: venue.drift_px),
     (
         "esc_venue_accepted_timestamp_seconds",
-        "When poses were last accepted.",
+        "Time at which poses were last accepted.",
         lambda venue: None if venue.accepted_at is None else venue.accepted_at.timestamp(),
     ),
 )
 OF_CAMERAS: tuple[tuple[str, str, Callable[[CameraTrend], float | None]], ...] = (
     (
         "esc_camera_trend_meters",
-        "How far its moving average is from what is usual, at the far touchline.",
+        "Distance of the camera's moving average from its baseline, at the far touchline.",
         lambda camera: camera.moved_m,
     ),
     (
         "esc_camera_trend_cusum",
-        "The largest cumulative sum of its control charts, in standard deviations; above 5 its mean has moved.",
+        "Largest cumulative sum of the camera's control charts, in standard deviations; above 5 it has moved.",
         lambda camera: camera.cusum,
     ),
     (
         "esc_camera_trend_beyond",
-        "1 while a control chart, EWMA or CUSUM, says that its mean has moved.",
+        "1 while a control chart of the camera, EWMA or CUSUM, is beyond its limit.",
         lambda camera: float(camera.beyond),
     ),
 )
 OF_LIVE_POSES: tuple[tuple[str, str, Callable[[LiveGauges], float | None]], ...] = (
     (
         "esc_live_running",
-        "1 while the process that sends the venue's live poses reports, of those that reported within a day.",
+        "1 while the process that sends the venue's live poses reports; absent after a day without reports.",
         lambda live: float(live.running),
     ),
     (
         "esc_live_measured_ratio",
-        "Pictures of its tracked cameras in which lines were measured, of those of the last one to two minutes.",
+        "Share of the tracked cameras' pictures in which lines were measured, over the last one to two minutes.",
         lambda live: live.measured_share,
     ),
     (
         "esc_live_latency_p99_seconds",
-        "From the arrival of a picture until its pose was sent, over ten seconds: of its slowest camera.",
+        "Latency from the arrival of a picture to the sending of its pose, of the slowest camera over ten seconds.",
         lambda live: live.latency_p99_s,
     ),
 )
@@ -95,57 +95,57 @@ log = structlog.get_logger()
 
 
 class Metrics:
-    """The figures of one API process and, through `look`, those of the service."""
+    """Metrics of one API process and, through `read`, of the service."""
 
-    def __init__(self, look: Callable[[], StatisticsSnapshot], disk: Disk, silence_s: float) -> None:
+    def __init__(self, read: Callable[[], StatisticsSnapshot], disk: Disk, silence_s: float) -> None:
         self.registry = CollectorRegistry()
         self.requests = Counter(
             "esc_http_requests", "Requests answered.", ["method", "route", "status"], registry=self.registry
         )
         self.seconds = Histogram(
             "esc_http_request_duration_seconds",
-            "Time to answer; a route that ends in ?wait holds its answer.",
+            "Time to answer; routes that end in ?wait are long polls.",
             ["method", "route"],
             registry=self.registry,
         )
         self.parts = Gauge(
             "esc_part_up",
-            "Whether a part of the service is there, as /readyz of this process says.",
+            "1 if a part of the service works, as in /readyz of this process.",
             ["part"],
             registry=self.registry,
         )
         ProcessCollector(registry=self.registry)
-        self.registry.register(_Stored(look, disk, silence_s))
+        self.registry.register(_StoredMetrics(read, disk, silence_s))
 
 
-class _Stored(Collector):
-    def __init__(self, look: Callable[[], StatisticsSnapshot], disk: Disk, silence_s: float) -> None:
-        self._look = look
+class _StoredMetrics(Collector):
+    def __init__(self, read: Callable[[], StatisticsSnapshot], disk: Disk, silence_s: float) -> None:
+        self._read = read
         self._disk = disk
         self._silence_s = silence_s
 
     def describe(self) -> Iterator[Metric]:
-        """Nothing: registering must not read the database."""
+        """Yield nothing, so that registering does not read the database."""
         yield from ()
 
     def collect(self) -> Iterator[Metric]:
-        """Read the database, and how full the disk is; what cannot be read is missing, the rest is told."""
+        """Read database and disk; metrics that cannot be read are missing."""
         yield InfoMetricFamily(
             "esc_build", "The version.", {"version": build.version(), "commit": build.commit() or ""}
         )
         yield from self._room()
         yield from _unreadable()
         try:
-            figures = self._look()
+            figures = self._read()
         except DATABASE_OUTAGES:
             log.warning("no figures for Prometheus", exc_info=True)
-            yield _gauge("esc_database_up", "Whether the database answers.", 0)
+            yield _gauge("esc_database_up", "1 if the database answers.", 0)
             return
-        yield _gauge("esc_database_up", "Whether the database answers.", 1)
+        yield _gauge("esc_database_up", "1 if the database answers.", 1)
         yield from _queue(figures)
         yield from _jobs(figures.counters)
         yield from _schedules(figures)
-        # The worst of each, as many as a setting says.
+        # The worst of each, as many as the setting `metrics_venues` allows.
         yield from _gauges(OF_VENUES, figures.venues, OF_A_VENUE)
         yield from _gauges(OF_CAMERAS, figures.trends, {**OF_A_VENUE, "camera": lambda trend: trend.camera})
         yield from _gauges(OF_LIVE_POSES, figures.live, OF_A_VENUE)
@@ -159,16 +159,18 @@ class _Stored(Collector):
         except OSError:
             log.warning("cannot read how full the disk is", exc_info=True)
             return
-        yield _gauge("esc_upload_free_bytes", "Free where uploads lie while they arrive, on this machine.", spool)
+        yield _gauge("esc_upload_free_bytes", "Free space for arriving uploads on this machine.", spool)
         if free is not None:
-            yield _gauge("esc_disk_free_bytes", "Free where database and files grow.", free)
-            yield _gauge("esc_disk_needed_bytes", "With less free, uploads are refused.", self._disk.min_free_bytes)
+            yield _gauge("esc_disk_free_bytes", "Free space for database and files.", free)
+            yield _gauge(
+                "esc_disk_needed_bytes", "Free space below which uploads are refused.", self._disk.min_free_bytes
+            )
 
 
 def _unreadable() -> Iterator[Metric]:
     rows = GaugeMetricFamily(
         "esc_unreadable_rows",
-        "Stored rows that this process met within the last hour and could not read; its log names them.",
+        "Stored rows that this process could not read within the last hour; its log names them.",
         labels=["kind"],
     )
     counts = unreadable_rows()
@@ -178,17 +180,15 @@ def _unreadable() -> Iterator[Metric]:
 
 
 def _queue(figures: StatisticsSnapshot) -> Iterator[Metric]:
-    jobs = GaugeMetricFamily("esc_queue_jobs", "Jobs that wait.", labels=["priority"])
-    oldest = GaugeMetricFamily(
-        "esc_queue_oldest_age_seconds", "How long the oldest of them has waited.", labels=["priority"]
-    )
+    jobs = GaugeMetricFamily("esc_queue_jobs", "Jobs in the queue.", labels=["priority"])
+    oldest = GaugeMetricFamily("esc_queue_oldest_age_seconds", "Age of the oldest queued job.", labels=["priority"])
     for name, number in PRIORITIES.items():
         waiting = figures.queue.get(number)
         jobs.add_metric([name], waiting.jobs if waiting else 0)
         oldest.add_metric([name], waiting.oldest_s if waiting else 0)
     yield jobs
     yield oldest
-    yield _gauge("esc_jobs_running", "Jobs that are being computed.", figures.running)
+    yield _gauge("esc_jobs_running", "Running jobs.", figures.running)
 
 
 def _jobs(counters: Mapping[CounterKey, float]) -> Iterator[Metric]:
@@ -203,39 +203,39 @@ def _jobs(counters: Mapping[CounterKey, float]) -> Iterator[Metric]:
         others.add_metric(other, counters.get((OTHERS_ENDED, other), 0))
     yield others
     views = CounterMetricFamily(
-        "esc_views", "Cameras of calibrations by what their frames were like: usable, or why not.", labels=["condition"]
+        "esc_views", "Cameras in calibrations by their frames: usable, or why not.", labels=["condition"]
     )
     for condition in VIEW_CONDITIONS:
         views.add_metric([condition], counters.get((VIEWS, (condition,)), 0))
     yield views
     restarts = counters.get((RESTARTS, ()), 0)
     yield CounterMetricFamily(
-        "esc_job_restarts", "Attempts after a job's first: its worker died or was stopped.", value=restarts
+        "esc_job_restarts", "Attempts after a job's first one, whose worker died or was stopped.", value=restarts
     )
-    yield _histogram("esc_job_wait_seconds", "Of calibrations, from submission to the first attempt.", WAIT, counters)
-    yield _histogram(
-        "esc_job_duration_seconds", "Of calibrations, from the first attempt to the end.", DURATION, counters
+    yield _histogram("esc_job_wait_seconds", "Time from submission to start of calibrations.", WAIT, counters)
+    yield _histogram("esc_job_duration_seconds", "Time from start to end of calibrations.", DURATION, counters)
+    stages = HistogramMetricFamily(
+        "esc_job_stage_duration_seconds", "Durations of stages of jobs with a result.", labels=["stage"]
     )
-    stages = HistogramMetricFamily("esc_job_stage_duration_seconds", "Of jobs with a result.", labels=["stage"])
     for stage in STAGES:
         stages.add_metric([stage], *STAGE.read(counters, stage))
     yield stages
     yield _histogram(
-        "esc_job_stitch_error_pixels", "Of the poses that were found; 1 px is 10 cm.", STITCH_ERROR, counters
+        "esc_job_stitch_error_pixels", "Stitch errors of found poses; 1 px is 10 cm.", STITCH_ERROR, counters
     )
 
 
 def _schedules(figures: StatisticsSnapshot) -> Iterator[Metric]:
     late = GaugeMetricFamily(
         "esc_schedule_late_seconds",
-        "For how long the schedule has been due that has waited longest, by what its cameras did the last time.",
+        "Delay of the schedule that has been due for longest, by the answers of its cameras the last time.",
         labels=["cameras"],
     )
     for cameras, seconds in zip(("answered", "slow-or-silent"), figures.schedules_late_s, strict=True):
         late.add_metric([cameras], seconds)
     yield late
     fetches = HistogramMetricFamily(
-        "esc_source_fetch_seconds", "Of each source of a camera, by what came.", labels=["outcome"]
+        "esc_source_fetch_seconds", "Durations of fetches from sources of cameras, by outcome.", labels=["outcome"]
     )
     for outcome in (FRAME, NONE):
         fetches.add_metric([outcome], *FETCH.read(figures.counters, outcome))
@@ -247,7 +247,7 @@ def _gauges(
     figures: Sequence[Figures],
     labels: Mapping[str, Callable[[Figures], str]],
 ) -> Iterator[Metric]:
-    """Yield a gauge for each of these figures of venues or cameras; what has none is left out."""
+    """Yield the gauges of venues or cameras, without samples for unknown values."""
     for name, meaning, figure in families:
         family = GaugeMetricFamily(name, meaning, labels=list(labels))
         for one in figures:
@@ -258,29 +258,27 @@ def _gauges(
 
 
 def _alarms(figures: StatisticsSnapshot) -> Iterator[Metric]:
-    ringing = GaugeMetricFamily("esc_alarms", "Alarms of venues and cameras that ring.", labels=["rule"])
-    begun = CounterMetricFamily("esc_alarms_begun", "Alarms that began to ring.", labels=["rule"])
+    active = GaugeMetricFamily("esc_alarms", "Active alarms of venues and cameras.", labels=["rule"])
+    begun = CounterMetricFamily("esc_alarms_begun", "Alarms that began.", labels=["rule"])
     for rule in get_args(AlarmRule):
-        ringing.add_metric([rule], figures.alarms.get(rule, 0))
+        active.add_metric([rule], figures.alarms.get(rule, 0))
         begun.add_metric([rule], figures.counters.get((BEGUN, (rule,)), 0))
-    of_venues = GaugeMetricFamily("esc_venue_alarm", "1 for what rings, the longest first.", labels=["venue", "rule"])
+    of_venues = GaugeMetricFamily("esc_venue_alarm", "1 for an active alarm, oldest first.", labels=["venue", "rule"])
     for alarm in figures.ringing:
         of_venues.add_metric([alarm.venue, alarm.rule], 1)
-    yield from (ringing, begun, of_venues)
+    yield from (active, begun, of_venues)
 
 
 def _workers(workers: list[WorkerHeartbeat], silence_s: float) -> Iterator[Metric]:
     alive = [worker for worker in workers if worker.is_alive(silence_s)]
-    yield _gauge("esc_workers", "Workers that gave a sign of life.", len(alive))
-    up = GaugeMetricFamily(
-        "esc_worker_up", "Whether it gave one, until another takes its jobs over.", labels=["worker"]
-    )
-    age = GaugeMetricFamily("esc_worker_heartbeat_age_seconds", "Since its last one.", labels=["worker"])
-    model = InfoMetricFamily("esc_worker_model", "Its network; empty: missing.", labels=["worker"])
-    builds = InfoMetricFamily("esc_worker_build", "Its version; empty: 0.1.0.", labels=["worker"])
+    yield _gauge("esc_workers", "Workers with a recent heartbeat.", len(alive))
+    up = GaugeMetricFamily("esc_worker_up", "1 for a worker with a recent heartbeat.", labels=["worker"])
+    age = GaugeMetricFamily("esc_worker_heartbeat_age_seconds", "Time since its last heartbeat.", labels=["worker"])
+    model = InfoMetricFamily("esc_worker_model", "Network of a worker; empty: missing.", labels=["worker"])
+    builds = InfoMetricFamily("esc_worker_build", "Version of a worker; empty: 0.1.0.", labels=["worker"])
     unreadable = GaugeMetricFamily(
         "esc_worker_unreadable_jobs",
-        "Jobs that wait and that it cannot read: a newer version wrote them. They need a worker of that version.",
+        "Queued jobs that a worker cannot read since a newer version wrote them: they need a worker of that version.",
         labels=["worker"],
     )
     for worker in workers:
@@ -294,11 +292,11 @@ def _workers(workers: list[WorkerHeartbeat], silence_s: float) -> Iterator[Metri
 
 
 def _callbacks(figures: StatisticsSnapshot) -> Iterator[Metric]:
-    yield _gauge("esc_callbacks_waiting", "Callbacks that are due or will be tried again.", figures.callbacks_waiting)
-    told = CounterMetricFamily("esc_callbacks", "Callbacks that will not be tried again.", labels=["outcome"])
+    yield _gauge("esc_callbacks_waiting", "Callbacks that are due or will be retried.", figures.callbacks_waiting)
+    finished = CounterMetricFamily("esc_callbacks", "Callbacks that will not be retried.", labels=["outcome"])
     for outcome in ("delivered", "given-up", "expired"):
-        told.add_metric([outcome], figures.counters.get((CALLBACKS, (outcome,)), 0))
-    yield told
+        finished.add_metric([outcome], figures.counters.get((CALLBACKS, (outcome,)), 0))
+    yield finished
 
 
 def _gauge(name: str, meaning: str, value: float) -> Metric:

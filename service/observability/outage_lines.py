@@ -1,7 +1,7 @@
-"""Lines of the log about a database or bucket that is away: one a minute for each thing that fails, without tracebacks.
+"""Rate limit for log lines about an unavailable database or bucket: one a minute for each event, without tracebacks.
 
-While a database is away everything that needs it fails, some things many times a second, and always in the same place:
-a traceback says nothing that the first line of the error does not.
+During an outage everything that needs the database fails, some many times a second and always in the same place: a
+traceback says no more than the first line of the error.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from typing import Any
 import structlog
 
 EVERY_S = 60.0
-# Of drivers and of what keeps connections, which other libraries log as they come: a test of the type would load them.
+# Packages and errors of drivers and pools, by name: checking types would import them.
 OF_DRIVERS = ("psycopg", "psycopg_pool", "sqlite3", "sqlalchemy")
 DRIVER_OUTAGES = ("OperationalError", "InterfaceError", "InternalError", "TimeoutError", "PoolTimeout")
 
 
 class OutageLines:
-    """Lets one line a minute through for each event and kind of outage; the next one says how many were left out."""
+    """Lets one line a minute pass for each event and type of error; the next one says how many were left out."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -30,7 +30,7 @@ class OutageLines:
         self._left_out: dict[tuple[str, str], int] = {}
 
     def structured(self, _: Any, __: str, line: MutableMapping[str, Any]) -> MutableMapping[str, Any]:
-        """Shorten a line of structlog, or drop it: a processor."""
+        """Shorten or drop a line of structlog (a processor)."""
         error = _error_in(line.get("exc_info"))
         if error is not None and _is_outage(error):
             left_out = self._left_out_before(str(line["event"]), error)
@@ -41,10 +41,10 @@ class OutageLines:
         return line
 
     def filter(self, record: logging.LogRecord) -> bool:
-        """Shorten a line of the standard library, or drop it: a filter of a handler."""
+        """Shorten or drop a line of the standard library (a filter of a handler)."""
         error = _error_in(record.exc_info)
         if error is not None and _is_outage(error):
-            # Without its arguments: those are another job's each time.
+            # The message without its arguments, which differ from job to job.
             left_out = self._left_out_before(f"{record.name} {record.msg}", error)
             if left_out is None:
                 return False
@@ -54,7 +54,7 @@ class OutageLines:
         return True
 
     def _left_out_before(self, event: str, error: BaseException) -> int | None:
-        """Return how many such lines were left out since the last one; None: this one is left out as well."""
+        """Return the number of lines left out since the last one; None if this one is left out, too."""
         key, now = (event, type(error).__name__), time.monotonic()
         with self._lock:
             if now < self._next_s.get(key, now):
@@ -79,7 +79,7 @@ def _error_in(exc_info: Any) -> BaseException | None:
 def _is_outage(error: BaseException) -> bool:
     if type(error).__module__.partition(".")[0] in OF_DRIVERS:
         return any(kind.__name__ in DRIVER_OUTAGES for kind in type(error).__mro__)
-    # What is installed for the client alone has no bucket.
+    # The client alone is installed without the store.
     blobs = sys.modules.get("service.store.blobs")
     return blobs is not None and isinstance(error, blobs.BLOB_OUTAGES)
 

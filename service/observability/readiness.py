@@ -1,8 +1,8 @@
-"""Readiness: whether this process can answer, and what else of the service is missing, part by part.
+"""Readiness of an API process, and the state of each part of the service.
 
-Only the database decides: without it nothing can be answered. A worker, its network, the files or room on the disk
-that are missing are the same for every process of the service, so that a balancer that went by them would take all of
-them out at once, and with them every answer that needs none of it.
+Only the database decides: without it nothing can be answered. A missing worker or network, missing files or disk space
+are the same for every process, so that a load balancer which used them would remove all processes at once, and with
+them every answer that needs none of these.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from service.store.database import connect
 from service.store.jobs.queries import JobRepository
 from service.store.workers import WorkerHeartbeat, WorkerRepository
 
-# Anybody may ask, and a bucket asks for money: one look answers all who come within this time.
+# Anybody may ask, and a bucket costs money: a result is reused for this time.
 HOLDS_FOR_S = 1.0
-# Whoever asks has an answer after this, whatever hangs.
+# Time limit of an answer, even if checks hang.
 LIMIT_S = 2.0
 DECIDES = "database"
 
 
 @dataclass(frozen=True)
 class ComponentState:
-    """A part of the service: whether it is there, and what there is to say about it."""
+    """State of a part of the service: whether it works, and a sentence about it."""
 
     ok: bool
     says: str = "ok"
@@ -39,10 +39,10 @@ ComponentStates = dict[str, ComponentState]
 
 
 class Readiness:
-    """Checks database, files, room on the disk, workers and their networks.
+    """Checks of database, files, disk space, workers and their networks.
 
-    In threads and on connections of its own: those that answer requests may all be waiting for what hangs. A check that
-    hangs is begun again only after its end.
+    They have their own threads and connections, since those of requests may all be waiting for a part that hangs. A
+    check that hangs is not started again before its end.
     """
 
     def __init__(self, database_url: str, blobs: Blobs, disk: Disk, silence_s: float) -> None:
@@ -51,7 +51,7 @@ class Readiness:
         self._blobs = blobs
         self._disk = disk
         self._silence_s = silence_s
-        # By the parts that each tells of.
+        # By the parts that each check reports.
         self._checks: Mapping[tuple[str, ...], Callable[[], ComponentStates]] = {
             (DECIDES,): lambda: {DECIDES: _answers(self._jobs.check, "cannot be read")},
             ("blobs",): lambda: {"blobs": _answers(self._blobs.check, "cannot be reached")},
@@ -65,8 +65,8 @@ class Readiness:
         self._seen_at = float("-inf")
 
     async def look(self) -> ComponentStates:
-        """Every part by its name, not older than a second."""
-        # Those who come meanwhile wait here: one look is enough for all.
+        """Return the state of every part by name, at most a second old."""
+        # Concurrent requests wait here and share one check.
         async with self._one_at_a_time:
             if time.monotonic() - self._seen_at > HOLDS_FOR_S:
                 self._seen = await self._look()
@@ -74,7 +74,7 @@ class Readiness:
             return self._seen
 
     def close(self) -> None:
-        """Let the database go."""
+        """Stop the checks and close the connections."""
         self._threads.shutdown(wait=False, cancel_futures=True)
         self._engine.dispose()
 
@@ -124,7 +124,7 @@ def _answers(check: Callable[[], None], otherwise: str) -> ComponentState:
 
 
 def _model(alive: list[WorkerHeartbeat]) -> ComponentState:
-    """The network: one hash, or for the minutes of an upgrade several."""
+    """Return the state of the networks of workers: one hash, or several during an upgrade."""
     missing = [worker.name for worker in alive if worker.model_sha256 is None]
     if missing:
         return ComponentState(False, f"missing at {', '.join(missing)}")

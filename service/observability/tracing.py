@@ -1,8 +1,8 @@
-"""Traces: a span per request, per job and per stage, sent where OpenTelemetry's own variables say.
+"""Traces: a span per request, per job and per stage, sent to the endpoint of OpenTelemetry's environment variables.
 
-Without `OTEL_EXPORTER_OTLP_ENDPOINT`, or without the extra `tracing`, nothing is recorded and nothing more is loaded
-than OpenTelemetry's interface, which FastAPI brings. The context of a caller's trace (W3C Trace Context, `traceparent`)
-is handed on to the job in any case.
+Without `OTEL_EXPORTER_OTLP_ENDPOINT`, or without the extra `tracing`, nothing is recorded and only OpenTelemetry's API
+is loaded, which FastAPI brings. The context of a caller's trace (W3C Trace Context, `traceparent`) is passed to the job
+in any case.
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ from opentelemetry.trace.propagation.tracecontext import TraceContextTextMapProp
 
 from service import build
 
-# Of the only version there is.
+# Version 00, the only one.
 TRACEPARENT = re.compile(r"00-(?!0{32})([0-9a-f]{32})-(?!0{16})[0-9a-f]{16}-[0-9a-f]{2}")
 ENDPOINTS = ("OTEL_EXPORTER_OTLP_ENDPOINT", "OTEL_EXPORTER_OTLP_TRACES_ENDPOINT")
-# For what is left to send when a process ends.
+# Time to send the remaining spans when a process ends.
 FLUSH_S = 2.0
 log = structlog.get_logger()
 
 
 def configure(service: str, instance: str) -> None:
-    """Let spans of this process be sent, if somebody has said where to."""
+    """Send spans of this process if an endpoint is configured."""
     if not any(os.environ.get(name) for name in ENDPOINTS) or os.environ.get("OTEL_SDK_DISABLED", "").lower() == "true":
         return
     try:
@@ -53,26 +53,26 @@ def configure(service: str, instance: str) -> None:
 
 
 def flush() -> None:
-    """Send what is left; for a process that is about to end without further ado."""
+    """Send the remaining spans, in a process that is about to exit."""
     provider = trace.get_tracer_provider()
     if hasattr(provider, "force_flush"):
         provider.force_flush(int(FLUSH_S * 1000))
 
 
 def trace_id_in(traceparent: str | None) -> str | None:
-    """The trace that a `traceparent` belongs to; None if it is not one."""
+    """Return the trace id in a `traceparent`; None if it is invalid."""
     found = TRACEPARENT.fullmatch(traceparent or "")
     return found[1] if found else None
 
 
 def current_traceparent() -> str | None:
-    """Of the span that is being recorded, for whoever goes on with its trace."""
+    """Return the `traceparent` of the current span; None if none is recorded."""
     carrier: dict[str, str] = {}
     TraceContextTextMapPropagator().inject(carrier)
     return carrier.get("traceparent")
 
 
 def context_of(traceparent: str | None) -> Context:
-    """The place in a trace that a new span belongs under."""
+    """Return the context of a `traceparent`, as the parent of a new span."""
     carrier = {} if traceparent is None else {"traceparent": traceparent}
     return TraceContextTextMapPropagator().extract(carrier, context=Context())

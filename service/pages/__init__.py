@@ -1,21 +1,19 @@
-"""The operator's page: rendered here, drawn by plain HTML, CSS and a little JavaScript, nothing from the internet."""
+"""The operator's web pages: rendered on the server, with a little JavaScript and nothing from the internet."""
 
 from fastapi import APIRouter
 
 from service.pages import (
     assets,
-    calibrate,
-    ignore,
     jobs,
     live,
     new_venue,
     problem_pages,
     signin,
-    venue_settings,
+    venue_forms,
     venues,
 )
 
-# Before the routes of the interface: for browsers alone, at addresses that the interface has as well.
+# Included before the routes of the interface: at the same paths, for browsers alone.
 FOR_BROWSERS: APIRouter = problem_pages.router
 show_browsers_what_is_missing = problem_pages.show_browsers_what_is_missing
 ROUTERS: tuple[APIRouter, ...] = (
@@ -26,9 +24,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     venues.router,
     venues.data,
     live.data,
-    calibrate.router,
-    ignore.router,
-    venue_settings.router,
+    venue_forms.router,
     new_venue.router,
     new_venue.data,
     jobs.router,

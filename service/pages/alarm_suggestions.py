@@ -1,4 +1,4 @@
-"""Limits of alarms that a venue's own calibrations suggest, for boxes of the settings that are empty."""
+"""Suggested alarm limits for a venue, by the spread of its own calibrations."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from service.schemas.trend import Trend
 from service.store.statistics.past_calibrations import PastCalibration
 
 MISSED = 2
-"""Usual times between two calibrations: by then one was missed."""
+"""Median intervals between two calibrations after which one was missed."""
 
 
 def suggested_limits(
     ends: Sequence[PastCalibration], revisions: Sequence[Revision], trends: Sequence[Trend]
 ) -> dict[str, str]:
-    """Return limits by the names of the rules, of those of which there are nights enough to say what is usual.
+    """Return suggested limits by rule, for rules with enough nights for a baseline.
 
-    A distance is three sigma above the usual one, as in control charts. `ends` and `revisions`: newest first.
+    A limit is three sigma above the usual value, as in control charts. `ends` and `revisions`: newest first.
     """
     ends = [end for end in ends if not end.dry_run]
     moved_px = [end.moved_px for end in ends if end.accepted and end.moved_px is not None]
@@ -37,8 +37,8 @@ def suggested_limits(
     limits = {
         "moved_since_last_px": _three_sigma_above(moved_px),
         "moved_since_first_px": _three_sigma_above(drift_px),
-        "rejected_in_a_row": _longer_than_ever(ends),
-        "not_calibrated_for_h": _hours_of_one_missed([end.finished_at for end in ends if end.accepted]),
+        "rejected_in_a_row": _longest_run_plus_one(ends),
+        "not_calibrated_for_h": _hours_until_missed([end.finished_at for end in ends if end.accepted]),
         "trend_m": LIMIT_SIGMA * max(spreads_m) if spreads_m else trends[0].alarm_m if trends else None,
     }
     return {rule: f"{_rounded_up(limit):g}" for rule, limit in limits.items() if limit}
@@ -57,21 +57,21 @@ def _three_sigma_above(values: Sequence[float]) -> float | None:
     return usual.centre + LIMIT_SIGMA * usual.extra
 
 
-def _longer_than_ever(ends: Sequence[PastCalibration]) -> float | None:
-    """One more than were ever refused in a row."""
+def _longest_run_plus_one(ends: Sequence[PastCalibration]) -> float | None:
+    """Return one more than the longest run of rejected calibrations."""
     if len(ends) < NIGHTS_OF_BASELINE:
         return None
     runs = [len(list(run)) for is_accepted, run in groupby(ends, lambda end: bool(end.accepted)) if not is_accepted]
     return max(runs, default=1) + 1
 
 
-def _hours_of_one_missed(moments: Sequence[datetime]) -> float | None:
+def _hours_until_missed(moments: Sequence[datetime]) -> float | None:
     if len(moments) < NIGHTS_OF_BASELINE:
         return None
     return MISSED * median((later - earlier).total_seconds() for later, earlier in pairwise(moments)) / 3600
 
 
 def _rounded_up(limit: float) -> float:
-    """Two places of it: 0.83 becomes 0.83, 2.412 becomes 2.5."""
+    """Round up to two significant digits: 0.83 stays, 2.412 becomes 2.5."""
     step = 10.0 ** (math.floor(math.log10(limit)) - 1)
     return math.ceil(limit / step - 1e-6) * step

@@ -1,4 +1,4 @@
-"""Static files of the page, under addresses that change with their content: a browser keeps them for a year."""
+"""Static files of the pages, at addresses that change with their content: browsers cache them for a year."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ at_the_root = APIRouter(route_class=Guarded, include_in_schema=False)
 
 @cache
 def contents() -> dict[str, bytes]:
-    """Every file by its path."""
+    """Return the content of every file by its path."""
     paths = sorted(path for path in FILES.rglob("*") if path.is_file())
     return {path.relative_to(FILES).as_posix(): path.read_bytes() for path in paths}
 
 
 @cache
 def files_version() -> str:
-    """A name of all files as they are: scripts import each other by relative addresses, so one name is for all."""
+    """Return a hash of all files; one for all, since scripts import each other by relative addresses."""
     together = hashlib.sha256()
     for path, content in contents().items():
         together.update(path.encode() + b"\0" + hashlib.sha256(content).digest())
@@ -37,7 +37,7 @@ def files_version() -> str:
 
 
 def address(path: str) -> str:
-    """Where a file is."""
+    """Return the address of a file. Raises `KeyError` if there is none."""
     if path not in contents():
         raise KeyError(path)
     return f"/ui/static/{files_version()}/{path}"
@@ -45,18 +45,18 @@ def address(path: str) -> str:
 
 @at_the_root.get("/favicon.ico", openapi_extra=FOR_ALL)
 async def favicon() -> Response:
-    """The sign of the service, where browsers look for one that a page does not name: that is an SVG as well."""
+    """Answer the icon at the address that browsers try by default; it is an SVG."""
     return Response(
         contents()["icon.svg"], media_type="image/svg+xml", headers={"Cache-Control": "public, max-age=86400"}
     )
 
 
-@router.get("/{of_edition}/{path:path}", openapi_extra=FOR_ALL)
-async def static_file(of_edition: str, path: str, if_none_match: IfNoneMatch = None) -> Response:
-    """A file; a page that was loaded before an update gets the new one, and does not keep it."""
+@router.get("/{version}/{path:path}", openapi_extra=FOR_ALL)
+async def static_file(version: str, path: str, if_none_match: IfNoneMatch = None) -> Response:
+    """Answer a file. A page that was loaded before an update gets the new file, and may not cache it."""
     content = contents().get(path)
     if content is None:
         raise Problem("not-found", f"The page has no file {path[:200]}; load it again.")
     media_type = mimetypes.guess_type(path)[0] or "application/octet-stream"
-    kept = FOR_A_YEAR if of_edition == files_version() else "no-cache"
-    return tagged_response(content, if_none_match, lambda: Response(content, media_type=media_type), kept)
+    caching = FOR_A_YEAR if version == files_version() else "no-cache"
+    return tagged_response(content, if_none_match, lambda: Response(content, media_type=media_type), caching)

@@ -1,4 +1,4 @@
-"""The documents that pages show: Markdown files of the package, as HTML with links that lead somewhere here."""
+"""Documents of the package, rendered from Markdown to HTML with links between pages of the service."""
 
 from __future__ import annotations
 
@@ -12,81 +12,69 @@ from markdown_it.token import Token
 FILES = Path(__file__).parent / "documents"
 NAMES: tuple[str, ...] = tuple(sorted(path.stem for path in FILES.glob("*.md")))
 _markdown = MarkdownIt("commonmark", {"html": False}).enable("table")
-# Elsewhere than at a heading, a link of one of our files to another.
+# Links that can be followed here: to a document, to a heading, or both.
 _LINK = re.compile(r"(?:(?P<name>[a-z-]+)\.md)?(?P<anchor>#[a-z0-9-]+)?")
 
 
 def address(name: str, anchor: str = "") -> str:
-    """Where a document is shown, at one of its headings."""
+    """Return the address of a document, at one of its headings."""
     return f"/ui/documents/{name}" + (f"#{anchor}" if anchor else "")
 
 
 @cache
 def title(name: str) -> str:
-    """The first heading of a document."""
+    """Return the first heading of a document."""
     return next(_text(inline) for opening, inline in _headings(_tokens(name)) if opening.tag == "h1")
 
 
 @cache
 def whole(name: str) -> str:
-    """A document without its first heading."""
-    return _rendered(_tokens(name)[3:])
+    """Return a document without its first heading, as HTML."""
+    return _without_heading(_parts(name))
 
 
 @cache
 def section(name: str, anchor: str) -> str:
-    """The part of a document below the heading of this anchor."""
-    return _rendered(_section(name, anchor))
-
-
-def _section(name: str, anchor: str) -> list[Token]:
-    """The part of a document below the heading of this anchor: of the first heading, what comes before the second."""
-    tokens = _tokens(name)
-    begin, level = next(
-        (number, token.tag)
-        for number, token in enumerate(tokens)
-        if token.type == "heading_open" and token.attrGet("id") == anchor
-    )
-    last = "h2" if level == "h1" else level
-    end = next(
-        (
-            number
-            for number, token in enumerate(tokens[begin + 3 :], begin + 3)
-            if token.type == "heading_open" and token.tag <= last
-        ),
-        len(tokens),
-    )
-    return tokens[begin + 3 : end]
+    """Return the text below the heading with this anchor, as HTML; below the title, what precedes the next heading."""
+    parts = _parts(name)
+    begin = next(number for number, part in enumerate(parts) if part.startswith(f'id="{anchor}"', len("<h1 ")))
+    level = max(_level(parts[begin]), 2)
+    ends = [number for number in range(begin + 1, len(parts)) if _level(parts[number]) <= level]
+    return _without_heading(parts[begin : min(ends, default=None)])
 
 
 @cache
 def reason(name: str, anchor: str, word: str) -> str:
-    """Return what a section that is about several reasons says of this one; else the whole section."""
-    tokens = _section(name, anchor)
-    begins = [
-        (number, f"`{word}`" in tokens[number + 1].content)
-        for number, token in enumerate(tokens)
-        if token.type == "paragraph_open" and tokens[number + 1].content.startswith("Reason `") and token.level == 0
-    ]
-    if len(begins) < 2:
-        return _rendered(tokens)
-    ends = [number for number, _ in begins[1:]] + [len(tokens)]
-    own = [tokens[begin:end] for (begin, is_own), end in zip(begins, ends, strict=True) if is_own]
-    return _rendered([token for part in own for token in part]) if own else _rendered(tokens)
+    """Return the paragraphs about one reason in a section about several; else the whole section, as HTML."""
+    content = section(name, anchor)
+    _, *reasons = re.split(r"(?=<p>Reason <code>)", content)
+    own = [part for part in reasons if f"<code>{word}</code>" in part.partition("</p>")[0]]
+    return "".join(own) if own and len(reasons) > 1 else content
 
 
-def _rendered(tokens: list[Token]) -> str:
-    return str(_markdown.renderer.render(tokens, _markdown.options, {}))
+@cache
+def _parts(name: str) -> list[str]:
+    """Return a document as HTML, split before each heading."""
+    rendered = str(_markdown.renderer.render(_tokens(name), _markdown.options, {}))
+    return re.split(r'(?=<h[1-6] id=")', rendered)[1:]
+
+
+def _level(part: str) -> int:
+    return int(part[len("<h")])
+
+
+def _without_heading(parts: list[str]) -> str:
+    return "".join(parts).partition("\n")[2]
 
 
 @cache
 def _tokens(name: str) -> list[Token]:
-    """What a document is made of, made fit for a page of this service."""
+    """Return the tokens of a document, with anchors, links to pages, and tables that can scroll."""
     tokens: list[Token] = []
     for token in _markdown.parse((FILES / f"{name}.md").read_text(encoding="utf-8")):
         if token.type == "table_open":
             tokens.append(Token("html_block", "", 0, content='<div class="scrolls" tabindex="0">'))
-        # Alignment comes as a style in place, which the policy of pages refuses.
+        # Column alignment is an inline style, which the Content-Security-Policy forbids.
         token.attrs.pop("style", None)
         if token.type == "inline":
             token.children = _linked(name, token.children or [])
@@ -99,7 +87,7 @@ def _tokens(name: str) -> list[Token]:
 
 
 def _headings(tokens: list[Token]) -> list[tuple[Token, Token]]:
-    """The beginning of each heading, and what it says."""
+    """Return the opening token and the text token of each heading."""
     return [(token, tokens[number + 1]) for number, token in enumerate(tokens) if token.type == "heading_open"]
 
 
@@ -108,12 +96,12 @@ def _text(inline: Token) -> str:
 
 
 def _anchor(heading: str) -> str:
-    """As forges make them."""
+    """Return the anchor of a heading, as GitHub makes it."""
     return re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-")
 
 
 def _linked(name: str, tokens: list[Token]) -> list[Token]:
-    """Links to what is shown here lead there; of others their words are left."""
+    """Point links to documents at their pages, and replace other links by their words."""
     kept: list[Token] = []
     dropped = False
     for token in tokens:

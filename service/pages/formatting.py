@@ -1,4 +1,4 @@
-"""How the page says figures and times. The numbers of the interface stay exact; here they are read by people."""
+"""Numbers and times in words for people, and names of alarms and kinds of jobs."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from service.schemas.names import JobKind
 from service.schemas.problems import Problem
 
 NONE = "–"
-# A stitch error of 1 px is so much on the pitch.
+# Length on the pitch of a stitch error of 1 px.
 CM_PER_STITCH_PX = 10.0
 ALARMS: dict[AlarmRule, str] = {
     "moved-since-last": "Moved",
@@ -31,9 +31,7 @@ KINDS: dict[JobKind, str] = {
     "find": "Search for cameras",
 }
 STEPS = ((60.0, 1.0, "s"), (3600.0, 60.0, "min"), (86400.0, 3600.0, "h"), (float("inf"), 86400.0, "d"))
-
-
-# What a problem says whose words are for programs.
+# Replacements for details that only speak of requests.
 FOR_PEOPLE: dict[str, str] = {
     "venue-not-found": "There is no venue of this id: somebody has deleted it, or the address is mistyped.",
     "job-not-found": "There is no job of this id: somebody has deleted it, or the address is mistyped.",
@@ -42,14 +40,14 @@ OF_PROGRAMS = re.compile(r"\b(GET|PUT|POST|PATCH|DELETE) /")
 
 
 def for_people(problem: Problem) -> str:
-    """Return what a problem says to somebody before a page: sentences that speak of requests are left out."""
+    """Return the detail of a problem without sentences about HTTP requests."""
     sentences = re.split(r"(?<=[.!?])\s+", problem.detail)
-    said = " ".join(sentence for sentence in sentences if not OF_PROGRAMS.search(sentence))
-    return said or FOR_PEOPLE.get(problem.kind, "")
+    detail = " ".join(sentence for sentence in sentences if not OF_PROGRAMS.search(sentence))
+    return detail or FOR_PEOPLE.get(problem.kind, "")
 
 
 def figure(value: float | None, unit: str = "", digits: int = 2) -> str:
-    """A number with its unit, three significant places at most: 0.04 px, 13.5 px, 135 px."""
+    """Return a number with its unit and at most three significant digits: 0.04 px, 13.5 px, 135 px."""
     if value is None:
         return NONE
     places = max(0, digits - (abs(value) >= 10) - (abs(value) >= 100))
@@ -57,37 +55,37 @@ def figure(value: float | None, unit: str = "", digits: int = 2) -> str:
 
 
 def centimetres(metres: float | None) -> str:
-    """A length of a pose."""
+    """Return a length in centimetres."""
     return NONE if metres is None else figure(100 * metres, "cm")
 
 
 def on_the_pitch(stitch_error_px: float | None) -> str:
-    """A stitch error as a length on the pitch."""
+    """Return a stitch error as a length on the pitch."""
     return NONE if stitch_error_px is None else figure(CM_PER_STITCH_PX * stitch_error_px, "cm", 1)
 
 
 def degrees(value: float | None) -> str:
-    """An angle of a pose."""
+    """Return an angle in degrees."""
     return NONE if value is None else f"{value:.3f}°"
 
 
 def percent(share: float | None) -> str:
-    """A share of 0..1."""
+    """Return a share of 0..1 in per cent."""
     return NONE if share is None else f"{100 * share:.0f} %"
 
 
 def length_change(share: float) -> str:
-    """How much longer a focal length is than another one, of which it is this share longer: 0.12 % shorter."""
+    """Return a relative change of the focal length in words: `0.12 % shorter`."""
     return f"{100 * abs(share):.2f} % {'longer' if share >= 0 else 'shorter'}"
 
 
 def capitalised(words: str) -> str:
-    """Words that begin a sentence; the rest stays as it is."""
+    """Return words with a capital first letter; the rest stays."""
     return words[:1].upper() + words[1:]
 
 
 def ago(moment: datetime, now: datetime | None = None) -> str:
-    """How long it is since."""
+    """Return the time since a moment: `3 min ago`."""
     seconds = max(0.0, ((now or datetime.now(UTC)) - moment).total_seconds())
     if seconds < 5:
         return "just now"
@@ -96,10 +94,10 @@ def ago(moment: datetime, now: datetime | None = None) -> str:
 
 
 def moment(when: datetime) -> str:
-    """A date and a time of day, UTC."""
+    """Return a date and time of day in UTC."""
     return f"{when.astimezone(UTC):%Y-%m-%d %H:%M:%S} UTC"
 
 
 def seconds(value: float | None) -> str:
-    """A duration."""
+    """Return a duration in seconds."""
     return NONE if value is None else figure(value, "s")

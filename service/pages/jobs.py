@@ -1,12 +1,12 @@
-"""Jobs: all of them with filters, and one with its course, its numbers and its pictures."""
+"""Pages of jobs: the list with filters, and a job with its progress, numbers and pictures."""
 
 from __future__ import annotations
 
-from typing import Annotated, get_args
+from typing import Annotated, Any, get_args
 
 from fastapi import APIRouter, Query, Request, Response
 
-from service.api.context import InContext, JobIdPath
+from service.api.context import Context, InContext, JobIdPath
 from service.pages.outcome import outcome_of, poses_in_use
 from service.pages.page_rendering import Page, render_page
 from service.pages.venues import sizes_of
@@ -21,7 +21,7 @@ from service.store.jobs.task import UnreadableJob
 from service.store.repositories import Repositories
 
 PER_PAGE = 50
-# In their order; other kinds of jobs have others.
+# Stages of a calibration in their order.
 STAGES = ("segmentation", "evolution", "refinement", "preview")
 router = APIRouter(prefix="/ui/jobs", route_class=Page, include_in_schema=False)
 
@@ -37,7 +37,7 @@ def jobs(
     kind: Annotated[str, Query(pattern=f"^({'|'.join(get_args(JobKind))})?$")] = "",
     cursor: Annotated[str | None, Query(pattern=JOB_ID_PATTERN)] = None,
 ) -> Response:
-    """Jobs, newest first. A form sends the filters that were left open as empty strings."""
+    """List jobs, newest first. A form sends unset filters as empty strings."""
     wanted = JobPage(PER_PAGE, before=cursor, venue=venue or None, status=status or None, kind=kind or None, only=only)
     found = context.jobs.page(wanted)
     return render_page(
@@ -54,31 +54,36 @@ def jobs(
 
 @router.get("/{job_id}", openapi_extra=needs_scope("read"))
 def job(job_id: JobIdPath, request: Request, context: InContext) -> Response:
-    """One job, followed while it is open."""
+    """Show a job, followed while it is open."""
+    with context.snapshot():
+        content = _job_content(job_id, context)
+    return render_page(request, "job.html", **content)
+
+
+def _job_content(job_id: str, context: Context) -> dict[str, Any]:
+    """Return the content of the page of a job."""
     found = context.jobs.get(job_id)
     if found is None:
         kept = f"{context.settings.keep_jobs_days:g} days"
         raise Problem("job-not-found", f"It was deleted: by somebody, or since it ended more than {kept} ago.")
     venue = context.venues.readable(found.venue) if found.venue else None
-    return render_page(
-        request,
-        "job.html",
-        job=hide_other_asker(found),
-        stages=STAGES,
-        formats=get_args(FormatName),
-        outcome=outcome_of(context, found, poses_in_use(context, found.venue)),
-        sizes=sizes_of(venue),
-        adoptable=context.adoption.adoptable_numbers(job_id),
-        can_take=found.kind == "find" and context.adoption.can_adopt_found(job_id),
-        is_stored=found.venue is not None and context.venues.exists(found.venue),
+    return {
+        "job": hide_other_asker(found),
+        "stages": STAGES,
+        "formats": get_args(FormatName),
+        "outcome": outcome_of(context, found, poses_in_use(context, found.venue)),
+        "sizes": sizes_of(venue),
+        "adoptable": context.adoption.adoptable_numbers(job_id),
+        "can_take": found.kind == "find" and context.adoption.can_adopt_found(job_id),
+        "is_stored": found.venue is not None and context.venues.exists(found.venue),
         # A new venue has those cameras alone that the search had frames of.
-        has_every_frame=bool(found.frames) and (venue is None or venue.poses.keys() <= found.frames.keys()),
-        can_be_repeated=can_be_resubmitted(context, found),
-    )
+        "has_every_frame": bool(found.frames) and (venue is None or venue.poses.keys() <= found.frames.keys()),
+        "can_be_repeated": can_be_resubmitted(context, found),
+    }
 
 
 def can_be_resubmitted(context: Repositories, job: Job) -> bool:
-    """Whether the frames of a job are kept and are still frames of its venue, which nothing else is computed for."""
+    """True if a job's frames are kept and still fit its venue, and the venue has no active job."""
     try:
         before = context.submissions.of(job.id)
     except UnreadableJob:

@@ -1,4 +1,4 @@
-"""The card of live poses on the page of a venue: how each camera is doing now, and how far it was turned lately."""
+"""The live poses on the page of a venue: the state of each camera, and its recent rotation."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from service.schemas.live import LiveClock, LiveMinute, LiveState, LiveStatus
 from service.store.repositories import Repositories
 
 CURVE_MIN = 30
-# A word, a colour and a sign for each, so that no one of them is needed to read it.
+# Words, colour and icon of each status: readable without seeing the colour.
 STATUSES: dict[LiveStatus, tuple[str, str, str]] = {
     "measured": ("Measured", "good", "check"),
     "coasted": ("Lines not seen", "part", "alert"),
@@ -32,7 +32,7 @@ data = APIRouter(route_class=Guarded, include_in_schema=False)
 
 @dataclass(frozen=True)
 class TurnCurve:
-    """How far a camera was turned from its stored pose, by the minute; `words`: by how much at most."""
+    """Rotation of a camera from its stored pose, by the minute; `words`: the largest one."""
 
     line: Sparkline
     words: str
@@ -40,27 +40,27 @@ class TurnCurve:
 
 @dataclass(frozen=True)
 class LiveCard:
-    """What the page shows of a venue's live poses; `curves`: of cameras that were tracked for two minutes or more."""
+    """Live poses of a venue; `curves`: by camera, of those that were tracked for two minutes or more."""
 
     state: LiveState
     curves: dict[str, TurnCurve]
 
 
 def live_card(context: Repositories, venue_id: str) -> LiveCard | None:
-    """The card of a venue whose live poses were reported within a day; None: of any other."""
+    """Return the live poses of a venue; None if none were reported within a day."""
     state = context.live.reported_lately(venue_id)
     return None if state is None else LiveCard(state, turn_curves(context.live.history(venue_id, CURVE_MIN)))
 
 
 @data.get("/ui/venues/{venue_id}/live.json", openapi_extra=needs_scope("read"))
 def curves(stored: ExistingVenue, context: InContext) -> dict[str, Any]:
-    """The curve of each camera, as the card draws it."""
+    """Answer the curve of each camera."""
     found = turn_curves(context.live.history(stored.id, CURVE_MIN))
     return {camera: asdict(curve) for camera, curve in found.items()}
 
 
 def turn_curves(minutes: list[LiveMinute]) -> dict[str, TurnCurve]:
-    """A curve of each camera; a minute in which it was not tracked is passed over, and takes its room."""
+    """Return the curve of each camera; minutes in which it was not tracked are gaps."""
     if not minutes:
         return {}
     first, found = minutes[0].at, {}

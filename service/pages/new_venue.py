@@ -1,4 +1,4 @@
-"""The ways to a first calibration: by frames alone, or by the pitch, the lenses and clicked first poses."""
+"""Pages for a new venue: from frames alone, or from pitch, lenses and clicked first poses."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ data = APIRouter(prefix="/ui/new-venue", route_class=Guarded, include_in_schema=
 
 @router.get("/ui/new-venue", openapi_extra=needs_scope("admin"))
 def new_venue(request: Request, context: InContext) -> Response:
-    """The sport and a frame of each camera, from which a job finds the cameras."""
+    """Show the form for a sport and a frame of each camera, from which a job finds the cameras."""
     return _described(request, context, "new_venue.html")
 
 
 @router.get("/ui/new-venue/by-hand", openapi_extra=needs_scope("admin"))
 def by_hand(request: Request, context: InContext) -> Response:
-    """The guided way; what it gathers stays in the browser until the venue is created."""
+    """Show the guided form; its data stay in the browser until the venue is created."""
     return _described(request, context, "venue_by_hand.html")
 
 
@@ -53,13 +53,13 @@ def free_id(context: InContext) -> dict[str, str]:
 
 @data.get("/taken", openapi_extra=needs_scope("read"))
 def is_id_taken(context: InContext, venue_id: Annotated[str, Query(alias="id", pattern=ID_PATTERN)]) -> dict[str, bool]:
-    """Whether there is a venue of this id already."""
+    """Answer whether a venue has this id."""
     return {"taken": context.venues.get(venue_id) is not None}
 
 
 @data.post("/plan", openapi_extra=needs_scope("read"))
 def plan(field: FieldOfPlay) -> dict[str, Any]:
-    """A pitch from above: the field with all its measures, its lines and its named points, in metres."""
+    """Answer a pitch from above: the field with all dimensions, its lines and its named points, in metres."""
     return {
         "field": field.model_dump(mode="json"),
         "lines": [_polyline(shape) for shape in field.markings],
@@ -68,9 +68,9 @@ def plan(field: FieldOfPlay) -> dict[str, Any]:
 
 
 @data.post("/pose", openapi_extra=needs_scope("calibrate"))
-async def pose(asked: ClickedPoseRequest, context: InContext) -> ClickedPose:
-    """Where a camera stands by what was clicked so far."""
-    return await context.clicked_poses.find(asked)
+async def pose(clicked: ClickedPoseRequest, context: InContext) -> ClickedPose:
+    """Answer the pose of a camera by the points that were clicked so far."""
+    return await context.clicked_poses.find(clicked)
 
 
 def _polyline(shape: Shape) -> list[Point]:

@@ -14,7 +14,7 @@ from service.store.repositories import Repositories
 from service.store.revisions import CALIBRATION_CAUSES
 
 Use = Literal["in-use", "undone", "replaced", "never"]
-# How a revision came, where its number alone says nothing.
+# Causes of revisions in words.
 CAME_BY: dict[Cause, str] = {
     "put": "set by hand",
     "calibrated": "calibrated",
@@ -49,7 +49,7 @@ class PosesInUse:
         return f"revision {number} ({came})" if came else f"revision {number}"
 
     def is_of(self, job_id: str) -> bool:
-        """Return whether a calibration brought these poses."""
+        """True if this calibration brought the poses."""
         return self.origin.job == job_id and self.origin.cause in CALIBRATION_CAUSES
 
 
@@ -64,12 +64,12 @@ class Outcome:
 
     @property
     def is_in_use(self) -> bool:
-        """Return whether these poses are in use."""
+        """True if these poses are in use."""
         return self.use == "in-use"
 
 
 def outcome_of(context: Repositories, job: Job | None, in_use: PosesInUse | None) -> Outcome | None:
-    """Return what became of a calibration's poses; None for a job without any, or whose venue was deleted."""
+    """Return the outcome of a calibration; None for a job without poses, or of a deleted venue."""
     if job is None or in_use is None or not isinstance(job.result, Result):
         return None
     use, decidable = _use(context, job, in_use), context.decisions.decidable(job.id)
@@ -89,7 +89,7 @@ def _use(context: Repositories, job: Job, in_use: PosesInUse) -> Use:
         return "in-use"
     if job.venue is None or job.venue_revision is None:
         return "never"
-    # What came right after them, whatever came later.
+    # The revision right after these poses.
     (after,) = context.venues.history(job.venue, job.venue_revision + 2, 1)
     return "undone" if after.cause == "restored" else "replaced"
 

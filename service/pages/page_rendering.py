@@ -1,4 +1,4 @@
-"""How a page leaves: rendered with what every page needs, under a strict policy, and with problems as pages too."""
+"""Rendering of pages from templates, with a strict Content-Security-Policy and problems as pages."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from service.api.root_path import with_root_path
 from service.pages import formatting
 from service.pages.assets import address
 from service.pages.seam import is_within_uncertainty, seam_curve
-from service.pages.trend_curves import trend_curves
+from service.pages.trend_charts import trend_charts
 from service.routes.contract.guarded import Guarded
 from service.schemas.names import Scope
 from service.schemas.problems import PROBLEM_TYPES, REFUSAL_REASONS, Problem
@@ -32,21 +32,21 @@ from service.store.keys import Key
 from service.store.unreadable import UnreadableRow
 
 SIGN_IN = "/ui/sign-in"
-# Scripts, styles and pictures are files of this service; nothing inline, nobody frames it.
+# Scripts, styles and pictures are files of this service; nothing inline, and no framing by other sites.
 POLICY = "default-src 'self'; object-src 'none'; base-uri 'none'; form-action 'self'; frame-ancestors 'none'"
 HEADERS = {
     "Content-Security-Policy": POLICY,
     "Referrer-Policy": "same-origin",
-    # The numbers are of this moment, and whoever signs out leaves nothing behind.
+    # Pages show current numbers, and must not stay in the browser after signing out.
     "Cache-Control": "no-store",
 }
 log = structlog.get_logger()
-# How long ago something was changes by itself.
+# `3 min ago` changes by itself, and is no change of a page.
 TIME = re.compile(r"(<time\b[^>]*>)[^<]*")
 
 
 def part_version(part: str) -> str:
-    """A name of what a part of a page says: another one where it says something else, however long ago it was."""
+    """Return a hash of a part of a page without its relative times."""
     return hashlib.blake2s(TIME.sub(r"\1", part).encode(), digest_size=8).hexdigest()
 
 
@@ -62,7 +62,7 @@ templates.globals |= {
     "version": version("esc-calibration"),
     "is_within_uncertainty": is_within_uncertainty,
     "seam_curve": seam_curve,
-    "trend_curves": trend_curves,
+    "trend_charts": trend_charts,
     "reasons": REFUSAL_REASONS,
     "alarm_words": formatting.ALARMS,
     "kind_words": formatting.KINDS,
@@ -86,10 +86,10 @@ templates.filters |= {
 
 
 class Page(Guarded):
-    """A route that answers with a page, whatever happens; who is not signed in is sent to where one does it."""
+    """A route that answers with a page, also for errors; clients without a session are redirected to the sign-in."""
 
     def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
-        """Handle, and put into words what goes wrong."""
+        """Return the handler that turns errors into pages."""
         handle = super().get_route_handler()
 
         async def shown(request: Request) -> Response:
@@ -111,7 +111,7 @@ class Page(Guarded):
 
 
 def render_page(request: Request, template: str, status: int = 200, **content: Any) -> Response:
-    """A page from its template."""
+    """Render a template into an answer."""
     key: Key | None = getattr(request.state, "key", None)
     token = request.cookies.get(COOKIE)
     root_path = request.app.state.context.settings.root_path
@@ -127,12 +127,12 @@ def render_page(request: Request, template: str, status: int = 200, **content: A
 
 
 def has_scope(key: Key | None, needed: Scope) -> bool:
-    """Whether the owner of a key may do what needs this scope; anybody may where no keys are asked for."""
+    """True if a key has a scope, or no key is needed (None)."""
     return key is None or SCOPES.index(key.scope) >= SCOPES.index(needed)
 
 
 def problem_page(request: Request, problem: Problem) -> Response:
-    """A problem as a page, or the way to sign in."""
+    """Return the page of a problem, or a redirect to the sign-in."""
     status = PROBLEM_TYPES[problem.kind].status
     if status == HTTPStatus.UNAUTHORIZED:
         wanted = request.url.path + (f"?{request.url.query}" if request.url.query else "")
@@ -141,7 +141,7 @@ def problem_page(request: Request, problem: Problem) -> Response:
 
 
 def local_target(target: str) -> str:
-    """An address of this service to go on to, whatever somebody wrote into a link."""
-    # As browsers read it: without tabs and line ends, and a second slash of any kind begins the name of a host.
-    read = re.sub(r"[\t\r\n]", "", target).replace("\\", "/")
-    return target if read.startswith("/") and not read.startswith("//") else "/"
+    """Return a redirect target if it is a path of this service, else `/`: links may be forged (open redirects)."""
+    # Browsers drop tabs and line ends, and take two slashes or backslashes for the beginning of a host name.
+    parsed = re.sub(r"[\t\r\n]", "", target).replace("\\", "/")
+    return target if parsed.startswith("/") and not parsed.startswith("//") else "/"

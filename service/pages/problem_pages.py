@@ -1,4 +1,4 @@
-"""What refusals and problems mean, for people: the addresses that programs get JSON at, as pages for browsers."""
+"""Explanations of problems and of rejected poses, as pages for browsers at addresses where programs get JSON."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ Name = Annotated[str, Path(max_length=64)]
 
 
 class ForBrowsers(Page):
-    """A page at an address that answers everybody else with JSON."""
+    """A page for browsers, at an address where other clients get JSON."""
 
     def matches(self, scope: Any) -> tuple[Match, Any]:
-        """Not where JSON is wanted as well, or nothing is said of pages."""
+        """Match only requests that prefer HTML."""
         match, child = super().matches(scope)
         if match is not Match.NONE and not wants_page(Headers(scope=scope).get("accept", "")):
             return Match.NONE, {}
@@ -36,7 +36,7 @@ document_router = APIRouter(route_class=Page, include_in_schema=False)
 
 
 def wants_page(accept: str) -> bool:
-    """Whether a client names HTML and likes nothing with JSON in its name as well (RFC 9110, section 12.5.1)."""
+    """True if an `Accept` header prefers HTML to any JSON type (RFC 9110, section 12.5.1)."""
     quality = {"html": 0.0, "json": 0.0}
     for part in accept.lower().split(","):
         media_type, *parameters = (piece.strip() for piece in part.split(";"))
@@ -59,7 +59,7 @@ def _quality(parameters: list[str]) -> float:
 
 @router.get("/refusals", openapi_extra=FOR_ALL)
 def refusals(request: Request) -> Response:
-    """List every reason for a refusal, with what to do."""
+    """List every reason for rejecting a pose, with advice."""
     reasons = {f"/refusals/{name}": (known.title, known.do) for name, known in REFUSAL_REASONS.items()}
     return _for_browsers(render_page(request, "reasons.html", title="Reasons for refusals", reasons=reasons))
 
@@ -73,7 +73,7 @@ def problems(request: Request) -> Response:
 
 @router.get("/refusals/{reason}", openapi_extra=FOR_ALL)
 def refusal(reason: Name, request: Request) -> Response:
-    """What a reason for a refusal means, looks like, and what to do."""
+    """Explain a reason for rejecting a pose, with advice."""
     if reason not in REFUSAL_REASONS:
         raise Problem("not-found", "There is no such reason for a refusal.")
     known = REFUSAL_REASONS[reason]
@@ -89,7 +89,7 @@ def refusal(reason: Name, request: Request) -> Response:
 
 @router.get("/problems/{kind}", openapi_extra=FOR_ALL)
 def problem(kind: Name, request: Request) -> Response:
-    """What a kind of problem means; of those that jobs end with, what to do."""
+    """Explain a kind of problem, with advice if jobs can end with it."""
     if kind not in PROBLEM_TYPES:
         raise Problem("not-found", "There is no such kind of problem.")
     of_jobs = documents.section(DOCUMENT_NAME, JOBS_THAT_FAIL)
@@ -101,7 +101,7 @@ def problem(kind: Name, request: Request) -> Response:
 
 @document_router.get("/ui/documents/{name}", openapi_extra=FOR_ALL)
 def document(name: Name, request: Request) -> Response:
-    """A document."""
+    """Show a document."""
     if name not in documents.NAMES:
         raise Problem("not-found", f"The documents that are shown here are {', '.join(documents.NAMES)}.")
     return render_page(request, "document.html", title=documents.title(name), body=documents.whole(name))
@@ -121,13 +121,13 @@ def _explained(request: Request, title: str, body: Any, anchor: str, **more: Any
 
 
 def _for_browsers(page: Response) -> Response:
-    """Mark a page whose address is JSON for others."""
+    """Mark a page whose address has JSON for other clients, for caches."""
     page.headers["Vary"] = "Accept"
     return page
 
 
 def show_browsers_what_is_missing(app: FastAPI) -> None:
-    """Answer a browser at an address where nothing is with a page, and everybody else as before."""
+    """Answer browsers at an unknown address with a page; other clients get the same JSON as before."""
     as_json: Any = app.exception_handlers[HTTPException]
 
     async def answer(request: Request, error: HTTPException) -> Response:

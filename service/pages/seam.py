@@ -1,4 +1,4 @@
-"""The curve of a seam as an SVG: how far apart two cameras put the same paint, from one end of it to the other."""
+"""SVG chart of a seam: the distance between two cameras' positions of the same paint, along the seam."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from service.schemas.results import PairResult, SeamPlace
 
 WIDTH, HEIGHT, LEFT, BELOW, ABOVE = 480.0, 120.0, 34.0, 18.0, 8.0
 LEAST_TOP_CM = 5.0
-"""Errors that are harmless look harmless."""
+"""Least error at the top of the chart: harmless errors look harmless."""
 
 
 @dataclass(frozen=True)
 class SeamDot:
-    """A place of the seam in the box: its error, what is one sigma around it, and what to say of it.
+    """A place of the seam in the chart: its error, one sigma around it (`low`, `high`), and its tooltip (`words`).
 
-    `worst`: it is the worst one, and worse than its uncertainty explains.
+    `worst`: it is the worst place, by more than its uncertainty.
     """
 
     x: float
@@ -28,7 +28,7 @@ class SeamDot:
 
 @dataclass(frozen=True)
 class SeamCurve:
-    """Dots in a box of `WIDTH` x `HEIGHT`; `top_cm` is the error at its top, `base` the height of none."""
+    """Dots in a box of `WIDTH` x `HEIGHT`; `top_cm`: the error at the height `top`; `base`: the height of no error."""
 
     dots: list[SeamDot]
     path: str
@@ -38,12 +38,12 @@ class SeamCurve:
 
 
 def is_within_uncertainty(place: SeamPlace) -> bool:
-    """True where the error of a place may be none: it is less than two sigma."""
+    """True if the error of a place is below two sigma."""
     return place.error_cm < 2 * place.sigma_cm
 
 
 def seam_curve(pair: PairResult) -> SeamCurve | None:
-    """Of a pair of cameras, None where its seam has fewer than two places."""
+    """Return the chart of a pair of cameras; None if its seam has fewer than two places."""
     places = pair.seam
     if len(places) < 2:
         return None

@@ -1,4 +1,4 @@
-"""Signing in with a key, and out again."""
+"""Signing in with an API key, and signing out."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ out = APIRouter(route_class=Guarded, include_in_schema=False)
 async def sign_in_page(
     request: Request, context: InContext, wanted: Annotated[str, Query(alias="next", max_length=2048)] = "/"
 ) -> Response:
-    """The form; where no key is asked for there is nothing to sign in to."""
+    """Show the form; redirect to the list of venues if the service needs no key."""
     if not await context.authenticator.asks_for_keys():
         return RedirectResponse("/", HTTPStatus.SEE_OTHER)
     return render_page(request, "sign_in.html", next=local_target(wanted), problem=None)
@@ -33,12 +33,12 @@ async def sign_in_page(
 
 @router.post(SIGN_IN, openapi_extra=FOR_ALL)
 async def sign_in(request: Request, context: InContext) -> Response:
-    """Begin a session if the key is one of this service."""
+    """Begin a session for a valid key."""
     _require_own_page(request)
-    given = await _form(request)
-    target = local_target(given.get("next", "/"))
+    form = await _form(request)
+    target = local_target(form.get("next", "/"))
     try:
-        session = await context.authenticator.sign_in(request, given.get("key", ""))
+        session = await context.authenticator.sign_in(request, form.get("key", ""))
     except Problem as problem:
         status = PROBLEM_TYPES[problem.kind].status
         return render_page(request, "sign_in.html", status, next=target, problem=problem)
@@ -57,7 +57,7 @@ async def sign_in(request: Request, context: InContext) -> Response:
 
 @out.post("/ui/sign-out", openapi_extra=FOR_ALL)
 async def sign_out(request: Request, context: InContext) -> Response:
-    """End the session; without one there is nothing to end."""
+    """End the session, if there is one."""
     _require_own_page(request)
     await context.authenticator.sign_out(request)
     answer = Response(status_code=HTTPStatus.NO_CONTENT)
@@ -72,10 +72,9 @@ def _cookie_path(context: Context) -> str:
 
 
 def _require_own_page(request: Request) -> None:
-    """Nobody is signed in, or out, by a page of another site.
+    """Raise `Problem` for a request from a page of another site (CSRF).
 
-    A browser says by itself where a request comes from: by `Sec-Fetch-Site` where it trusts the address (https, or
-    localhost), by `Origin` anywhere.
+    Browsers send `Sec-Fetch-Site` to trustworthy addresses (https, or localhost), and `Origin` to all.
     """
     site, origin = request.headers.get("sec-fetch-site"), request.headers.get("origin")
     foreign = site != "same-origin" if site else origin and urlsplit(origin).netloc != request.headers.get("host")
@@ -84,7 +83,7 @@ def _require_own_page(request: Request) -> None:
 
 
 async def _form(request: Request) -> dict[str, str]:
-    """The fields of a form that has no files."""
+    """Return the fields of a URL-encoded form."""
     body = b""
     async for piece in request.stream():
         body += piece
@@ -94,5 +93,5 @@ async def _form(request: Request) -> dict[str, str]:
 
 
 def _over_tls(request: Request) -> bool:
-    """Whether the browser speaks https, to us or to the proxy in front of us, which then says so."""
+    """True if the browser uses https, to this service or to the proxy in front of it."""
     return request.url.scheme == "https" or request.headers.get("x-forwarded-proto", "") == "https"

@@ -1,4 +1,4 @@
-"""A small curve of the last stitch errors of a venue, as an SVG path: what happened to it, at a glance."""
+"""Small curves as SVG paths, such as the last stitch errors of a venue."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 WIDTH, HEIGHT, MARGIN = 120.0, 32.0, 3.0
-# The gate's line lies at least half way up, so that harmless noise looks harmless.
+# Least height of the limit, as a part of the box: harmless noise looks harmless.
 LIMIT_AT_LEAST = 0.5
 
 
 @dataclass(frozen=True)
 class Sparkline:
-    """`path` and the last `dot` in a box of `WIDTH` x `HEIGHT`; `limit`: height of the gate's line, if there is one."""
+    """A curve (`path`) and its last `dot` in a box of `WIDTH` x `HEIGHT`; `limit`: height of the limit, if any."""
 
     path: str
     dot: tuple[float, float]
@@ -20,7 +20,7 @@ class Sparkline:
 
 
 def sparkline(values: Sequence[float | None], limit: float | None) -> Sparkline | None:
-    """From values, oldest first; None: no two of them are known. Values above the top are drawn at the top."""
+    """Return the curve of values, oldest first; None if fewer than two are known. Values are clipped at the top."""
     known = [(number, value) for number, value in enumerate(values) if value is not None]
     if len(known) < 2:
         return None

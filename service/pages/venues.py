@@ -1,4 +1,4 @@
-"""All venues at a glance, and one of them: is the seam clean, did the cameras move, shall it be taken?"""
+"""Pages of venues: the list, and one venue with its last result, history and settings."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, get_args
 
 from fastapi import APIRouter, Query, Request, Response
 
-from service.api.context import InContext, VenueIdPath
+from service.api.context import Context, InContext, VenueIdPath
 from service.pages.live import CLOCKS, STATUSES, live_card
 from service.pages.outcome import CAME_BY, outcome_of, poses_in_use
 from service.pages.page_rendering import Page, render_page
@@ -19,7 +19,7 @@ from service.routes.contract.attribution import hide_other_actor
 from service.routes.contract.documented import needs_scope
 from service.routes.contract.guarded import Guarded
 from service.routes.contract.restricted import OnlyVenues, lists_by_venue
-from service.routes.venues import ExistingVenueId, existing_venue
+from service.routes.venues import existing_venue
 from service.schemas import etags
 from service.schemas.health import Alarm, VenueHealth
 from service.schemas.history import Cause, Revision
@@ -33,9 +33,9 @@ from service.store.statistics.venue_summary import CalibrationSummary
 from service.store.unreadable import UnreadableRow
 
 PER_PAGE = 50
-# What a chart shows, and a table beside it.
+# Calibrations in the chart of the history, and in its table.
 IN_CHART, IN_TABLE = 1000, 12
-# Of the trends: a year has every season in it, and three would be three times as slow to draw.
+# Time that trends show: a year has all seasons, and three years would take three times as long to draw.
 IN_TRENDS = timedelta(days=365)
 router = APIRouter(route_class=Page, include_in_schema=False)
 data = APIRouter(route_class=Guarded, include_in_schema=False)
@@ -43,25 +43,25 @@ data = APIRouter(route_class=Guarded, include_in_schema=False)
 
 @dataclass(frozen=True)
 class VenueRow:
-    """A venue in the list: its last calibration that ended, the one that is going on, what rings, what was decided."""
+    """A venue in the list: summary of its calibrations, active job, alarms, and the last decision of a person."""
 
     venue: Venue
-    glance: CalibrationSummary | None
+    summary: CalibrationSummary | None
     active: Job | None
     alarms: list[Alarm]
     decided: tuple[Cause, datetime] | None
 
     @property
     def decision(self) -> Literal["Undone", "Accepted by hand"] | None:
-        """Return what somebody has decided since the last calibration ended."""
-        if self.decided is None or self.glance is None or self.decided[1] < self.glance.last.finished_at:
+        """Decision of a person since the last calibration ended."""
+        if self.decided is None or self.summary is None or self.decided[1] < self.summary.last.finished_at:
             return None
         return "Undone" if self.decided[0] == "restored" else "Accepted by hand"
 
     @property
     def curve(self) -> Sparkline | None:
-        """The stitch errors of the last results."""
-        return sparkline(self.glance.errors, self.glance.limit_px) if self.glance else None
+        """Curve of the last stitch errors."""
+        return sparkline(self.summary.errors, self.summary.limit_px) if self.summary else None
 
 
 @router.get("/", openapi_extra=needs_scope("read"))
@@ -72,12 +72,14 @@ def venues(
     only: OnlyVenues,
     after: Annotated[str | None, Query(pattern=ID_PATTERN)] = None,
 ) -> Response:
-    """Every venue, with its last result."""
-    found = context.venues.page(after, PER_PAGE, only)
+    """List venues with their last results."""
+    with context.snapshot():
+        found = context.venues.page(after, PER_PAGE, only)
+        rows = venue_rows(context, found.venues)
     return render_page(
         request,
         "venues.html",
-        rows=venue_rows(context, found.venues),
+        rows=rows,
         unreadable=found.unreadable,
         after=found.next_cursor,
         first=not after,
@@ -85,15 +87,15 @@ def venues(
 
 
 def venue_rows(context: Repositories, venues: list[Venue]) -> list[VenueRow]:
-    """A few queries for all of them, however many jobs there are."""
+    """Return the rows of venues, with a fixed number of queries."""
     ids = [venue.id for venue in venues]
-    glances, alarms = context.venue_summaries.of(ids), context.venue_summaries.alarms(ids)
+    summaries, alarms = context.venue_summaries.of(ids), context.venue_summaries.alarms(ids)
     active, decided = context.past_calibrations.active(ids), context.past_calibrations.decided(ids)
     jobs = context.jobs.several(active.values())
     return [
         VenueRow(
             venue,
-            glances.get(venue.id),
+            summaries.get(venue.id),
             jobs.get(active.get(venue.id, "")),
             alarms.get(venue.id, []),
             decided.get(venue.id),
@@ -103,10 +105,11 @@ def venue_rows(context: Repositories, venues: list[Venue]) -> list[VenueRow]:
 
 
 @router.get("/ui/venues/{venue_id}", openapi_extra=needs_scope("read"))
-def venue(venue_id: ExistingVenueId, request: Request, context: InContext) -> Response:
-    """One venue: its last result and how it came to it, or the ways out where it cannot be read."""
+def venue(venue_id: VenueIdPath, request: Request, context: InContext) -> Response:
+    """Show a venue: its last result and how it came to it, or the ways out where it cannot be read."""
     try:
-        return _venue_page(venue_id, request, context)
+        with context.snapshot():
+            content = _venue_content(venue_id, context)
     except UnreadableRow as unreadable:
         revisions = context.venues.history(venue_id, None, IN_TABLE)
         return render_page(
@@ -118,58 +121,56 @@ def venue(venue_id: ExistingVenueId, request: Request, context: InContext) -> Re
             revisions=[hide_other_actor(one) for one in revisions],
             restorable=context.venues.repairing(venue_id, [one.revision for one in revisions]),
         )
+    return render_page(request, "venue.html", **content)
 
 
-def _venue_page(venue_id: str, request: Request, context: InContext) -> Response:
+def _venue_content(venue_id: str, context: Context) -> dict[str, Any]:
+    """Return the content of the page of a venue. Raises `UnreadableRow`."""
     stored = existing_venue(venue_id, context)
-    # First: what happens from here on may be shown already, and is told of once more.
-    seen = context.events.newest([venue_id]).get(venue_id, 0)
-    ends = context.past_calibrations.of(venue_id, IN_TABLE)
     newest = context.past_calibrations.newest_result(venue_id)
-    job = context.jobs.several([newest]).get(newest) if newest else None
+    active = context.past_calibrations.active([venue_id]).get(venue_id)
+    jobs = context.jobs.several([one for one in (newest, active) if one])
+    job = jobs.get(newest or "")
     revisions = context.venues.history(venue_id, None, IN_TABLE)
     health = context.venues.health(venue_id)
     in_use = poses_in_use(context, venue_id)
-    active = context.past_calibrations.active([venue_id]).get(venue_id)
     a_year_ago = datetime.now(UTC) - IN_TRENDS
-    return render_page(
-        request,
-        "venue.html",
-        venue=stored,
-        ends=ends,
-        job=job,
-        revisions=[hide_other_actor(one) for one in revisions],
-        remembering=context.venues.with_memories(venue_id),
-        health=health,
-        in_use=in_use,
-        outcome=outcome_of(context, job, in_use),
-        came_by=CAME_BY,
-        undone=undone_jobs(revisions),
-        sizes=sizes_of(stored),
-        adoptable=context.adoption.adoptable_numbers(job.id) if job else {},
-        restorable=context.venues.restorable(stored, [one.revision for one in revisions]),
-        kept_jobs=kept_jobs(context, revisions, health),
-        trends=[context.trends.of(stored, camera.id, a_year_ago) for camera in stored.cameras],
-        active=context.jobs.several([active]).get(active) if active else None,
-        live_poses=live_card(context, venue_id),
-        live_statuses=STATUSES,
-        live_clocks=CLOCKS,
-        formats=get_args(FormatName),
-        usual_view=ViewChoice(),
-        previewed=context.past_calibrations.last_taken(venue_id) is not None,
-        tag=etags.quoted(venue_etag(stored)),
-        seen=seen,
-    )
+    return {
+        "venue": stored,
+        "ends": context.past_calibrations.of(venue_id, IN_TABLE),
+        "job": job,
+        "revisions": [hide_other_actor(one) for one in revisions],
+        "remembering": context.venues.with_memories(venue_id),
+        "health": health,
+        "in_use": in_use,
+        "outcome": outcome_of(context, job, in_use),
+        "came_by": CAME_BY,
+        "undone": undone_jobs(revisions),
+        "sizes": sizes_of(stored),
+        "adoptable": context.adoption.adoptable_numbers(job.id) if job else {},
+        "restorable": context.venues.restorable(stored, [one.revision for one in revisions]),
+        "kept_jobs": kept_jobs(context, revisions, health),
+        "trends": [context.trends.of(stored, camera.id, a_year_ago) for camera in stored.cameras],
+        "active": jobs.get(active or ""),
+        "live_poses": live_card(context, venue_id),
+        "live_statuses": STATUSES,
+        "live_clocks": CLOCKS,
+        "formats": get_args(FormatName),
+        "usual_view": ViewChoice(),
+        "previewed": context.past_calibrations.last_taken(venue_id) is not None,
+        "tag": etags.quoted(venue_etag(stored)),
+        "seen": context.events.newest([venue_id]).get(venue_id, 0),
+    }
 
 
 def undone_jobs(revisions: list[Revision]) -> Collection[str]:
-    """Return the jobs whose poses somebody gave back and has not accepted again; `revisions`: newest first."""
+    """Return the jobs whose poses were undone and not accepted again; `revisions`: newest first."""
     last = {one.job: one.cause for one in reversed(revisions) if one.job}
     return {job for job, cause in last.items() if cause == "restored"}
 
 
 def kept_jobs(context: Repositories, revisions: list[Revision], health: VenueHealth | None) -> Collection[str]:
-    """Return the jobs that a page names beside the last calibrations, but for those that were deleted."""
+    """Return the jobs of revisions and schedule that still exist."""
     jobs = {one.job for one in revisions if one.job}
     if health and health.schedule and health.schedule.last_job:
         jobs.add(health.schedule.last_job)
@@ -178,7 +179,7 @@ def kept_jobs(context: Repositories, revisions: list[Revision], health: VenueHea
 
 @data.get("/ui/venues/{venue_id}/history.json", openapi_extra=needs_scope("read"))
 def history(venue_id: VenueIdPath, context: InContext) -> dict[str, Any]:
-    """What the chart draws, oldest first: times in seconds, a value or null for each."""
+    """Answer the data of the chart, oldest first: times in seconds, and a value or null for each."""
     ends = [end for end in reversed(context.past_calibrations.of(venue_id, IN_CHART)) if end.accepted is not None]
     cameras = sorted({camera for end in ends for camera in end.moved})
     return {
@@ -195,5 +196,5 @@ def history(venue_id: VenueIdPath, context: InContext) -> dict[str, Any]:
 
 
 def sizes_of(venue: Venue | None) -> dict[str, list[int]]:
-    """The width and height of each camera's frames."""
+    """Return width and height of each camera's frames."""
     return {camera.id: camera.image_size for camera in venue.cameras} if venue else {}

@@ -1,1 +1,1 @@
-"""What crosses HTTP and files: models, problems, schedules, and what is computed of them alone."""
+"""Pydantic models of the HTTP interface and of files, problems, schedules, and functions that need nothing else."""

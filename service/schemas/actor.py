@@ -1,4 +1,4 @@
-"""Who changed something, from where, and by which request."""
+"""The author of a change: name, address and request."""
 
 from __future__ import annotations
 
@@ -8,35 +8,35 @@ from pydantic import Field
 
 from service.schemas.base import Schema
 
-# To whoever may not know which.
+# Shown in place of the name to keys that may not see it.
 ANOTHER_KEY = "another key"
-# Of what happens to a venue.
-BY = "Who did it; null: the service by itself, or before 0.2.0."
+BY = "Author of the change; null: the service itself, or a version before 0.2.0."
 
 
 class Actor(Schema):
-    """Whoever made a change: what is told beside the change itself."""
+    """Author of a change: the API key or schedule, its address and the request."""
 
     name: str = Field(
-        description="`key NAME`: with this API key, on the page too; `schedule`: that of the venue; `anyone`: the "
-        "service asks for no keys; `another key`: to a key for some venues, any but itself."
+        description="`key NAME`: this API key, also on the page; `schedule`: the venue's schedule; `anyone`: the "
+        "service asks for no keys; `another key`: shown to a key that is limited to some venues, for any key but "
+        "itself."
     )
     address: str | None = Field(
-        description="IP address of the client, behind a trusted proxy the one that it names; null: there was none, or "
-        "it is left out, as it is for webhooks."
+        description="IP address of the client, as a trusted proxy reports it; null: none is known. Left out of "
+        "webhooks."
     )
-    request_id: str | None = Field(description="`X-Request-ID` of the request, by which its log lines are found.")
+    request_id: str | None = Field(description="`X-Request-ID` of the request; its log lines carry it too.")
 
     def without_address(self) -> Actor:
-        """Return the actor as receivers elsewhere are told it: the address of a client is personal data."""
+        """Return the actor without the client's address, for receivers outside: an address is personal data."""
         return self.model_copy(update={"address": None})
 
 
 class Attributed(Schema):
-    """An event with whoever made it happen."""
+    """An event and the author of the change that it reports."""
 
     by: Actor | None = Field(None, description=BY)
 
     def without_address(self) -> Self:
-        """Return the event as receivers elsewhere are told it."""
+        """Return the event without the author's address, for receivers outside."""
         return self if self.by is None else self.model_copy(update={"by": self.by.without_address()})

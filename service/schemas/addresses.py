@@ -1,4 +1,4 @@
-"""Addresses in what is sent: where frames are fetched, who is told of an end, and what is an IP address."""
+"""Types of addresses in requests: sources of frames and callback URLs; and parsing of IP addresses."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from urllib.parse import urlsplit
 from pydantic import AfterValidator, HttpUrl, StringConstraints
 
 IpAddress = IPv4Address | IPv6Address
-# Written as browsers understand it: 0x7f.1 is 127.0.0.1 from here on, for whoever looks at it.
+# Normalised as browsers do: 0x7f.1 becomes 127.0.0.1, so that later checks see the real host.
 CallbackUrl = Annotated[str, StringConstraints(max_length=1024), AfterValidator(lambda url: str(HttpUrl(url)))]
-# Stands where a secret was in an address that is shown.
+# Replaces a secret in an address that is shown.
 HIDDEN = "***"
 SOURCE_SCHEMES = ("http", "https", "rtsp", "rtsps")
 # The SHA-256 of the certificate that a camera must have: most sign their own, which no authority vouches for.
@@ -20,7 +20,7 @@ PINNED = re.compile(r"(https|rtsps)://[^#]*#tls_sha256=(?:[0-9a-f]{2}:?){32}", r
 
 
 def _is_a_source(url: str) -> str:
-    """Written as it is kept; an address with user or password in it is no reason to repeat them in an error."""
+    """Return the address of a source unchanged. Errors do not repeat it: it may hold a password."""
     try:
         parts = urlsplit(url)
         complete = parts.scheme in SOURCE_SCHEMES and parts.hostname and (parts.port is None or parts.port > 0)
@@ -40,7 +40,7 @@ SourceUrl = Annotated[str, StringConstraints(max_length=1024), AfterValidator(_i
 
 
 def ip_of(host: str) -> IpAddress | None:
-    """The address that a host is written as; None: it is a name."""
+    """Return the IP address that a host is written as; None for a name."""
     try:
         return ip_address(host)
     except ValueError:

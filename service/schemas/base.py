@@ -1,7 +1,7 @@
-"""What the models of the interface are made of: names, strict numbers, and the class they all are.
+"""Base class and basic types of the models of the interface.
 
-The models are strict for what clients send. What another version of ESC may have written, an answer of a service or a
-stored document, is read with `TOLERANTLY`, by the same models.
+The models are strict about requests. Documents that another version of ESC may have written (answers of a service,
+stored rows) are read by the same models with `TOLERANTLY`.
 """
 
 from __future__ import annotations
@@ -39,16 +39,16 @@ def _as_written(day: Any) -> Any:
     return day
 
 
-# Not a number of seconds as well, which Pydantic would take for a day.
+# Pydantic alone would also take a number of seconds for a day.
 Day = Annotated[date, BeforeValidator(_as_written)]
 
 
 class _WrittenByAnotherVersion:
-    """The validation context that says who wrote a document."""
+    """Validation context of documents that another version wrote."""
 
 
-# Of `model_validate` and `model_validate_json`: fields that this version does not know are ignored, here and in every
-# model inside, and words that it does not know are kept, see `OPEN_WORD`.
+# Arguments for `model_validate` and `model_validate_json`: unknown fields are ignored, in nested models too, and
+# unknown words are kept, see `OPEN_WORD`.
 TOLERANTLY: dict[str, Any] = {"extra": "ignore", "context": _WrittenByAnotherVersion()}
 
 
@@ -66,7 +66,7 @@ def _or_a_newer_word(word: Any, check: ValidatorFunctionWrapHandler, info: Valid
         raise
 
 
-# Of a field that is one of several words: a newer version may know more of them.
+# Annotation of an enumeration that newer versions may extend.
 OPEN_WORD = WrapValidator(_or_a_newer_word)
 
 
@@ -77,20 +77,20 @@ class Schema(BaseModel):
 
 
 class Unreadable(Schema):
-    """An entry of a list that the service has stored and cannot read, and why."""
+    """A stored entry that this version cannot read, and the reason."""
 
     id: str
     why: str = Field(examples=["field: the ridge must be 0 to 3 m high, not -0.001 m"])
 
 
-UNREADABLE = "Entries of this page that are stored and cannot be read; absent where there are none."
+UNREADABLE = "Entries of this page that are stored but cannot be read; absent if there are none."
 
 
 def is_empty(value: object) -> bool:
-    """Return True for a list that is left out of an answer unless it has entries."""
+    """True for a list that an answer leaves out: one without entries."""
     return value == []
 
 
 def is_none(value: object) -> bool:
-    """Whether a field is left out that is only there when it says something."""
+    """True for a value that an answer leaves out: None."""
     return value is None

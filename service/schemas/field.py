@@ -1,4 +1,4 @@
-"""The pitch: a sport's template or markings of one's own, its measures and its roof."""
+"""Model of the pitch: a sport's template or custom markings, its dimensions and its ridge."""
 
 from __future__ import annotations
 
@@ -31,19 +31,18 @@ PitchPoint = Annotated[list[Annotated[Number, Field(ge=-200, le=200)]], Field(mi
 Length = Annotated[Number, Field(gt=0, le=400)]
 PaintWidth = Annotated[Number, Field(ge=0.01, le=1)]
 Colour = Annotated[str, StringConstraints(pattern=COLOUR_PATTERN)]
-# Who knows less of a field than this knows another one.
+# A field that is known less well than this may be another one.
 MOST_SIGMA_M = 10.0
-# Further than this beside the field nothing counts as a marking of it.
+# Markings may lie this far outside the field.
 MARGIN_M = 2.0
 FOOTBALL = "football"
-# Lengths in which fields are measured besides, in metres.
+# Units that a length may have been given in by mistake, in metres.
 OTHER_UNITS = {"centimetres": 0.01, "feet": 0.3048, "yards": 0.9144}
-# Of other sports on the same ground.
 MAX_OTHER_FIELDS = 16
 
 
 class ArcIn(Schema):
-    """Counter-clockwise, seen from above, around `centre` from `start` to `end`, all on the middle of the paint."""
+    """An arc around `centre`, counter-clockwise seen from above from `start` to `end`, along the paint's middle."""
 
     centre: PitchPoint
     start: PitchPoint
@@ -72,17 +71,17 @@ class SpotIn(Schema):
 
 
 class MarkingIn(Schema):
-    """One thing painted, exactly one of `line`, `arc`, `circle` and `spot`; places are x, y from the centre, m."""
+    """One painted marking: exactly one of `line`, `arc`, `circle` and `spot`. Points are [x, y] from the centre, m."""
 
     name: Annotated[Name, Field(min_length=1)]
     line: Annotated[list[PitchPoint], Field(min_length=2, max_length=200)] | None = None
     arc: ArcIn | None = None
     circle: CircleIn | None = None
     spot: SpotIn | None = None
-    width_m: PaintWidth | None = Field(None, description="Of the paint; absent: the field's `line_width_m`.")
+    width_m: PaintWidth | None = Field(None, description="Width of the paint; absent: the field's `line_width_m`.")
     colour: Colour = Field(
         WHITE,
-        description="Of the paint: white, yellow, black, blue, red, green, orange or `#rrggbb`.",
+        description="Colour of the paint: white, yellow, black, blue, red, green, orange or `#rrggbb`.",
         examples=["yellow", "#0a5fa8"],
     )
 
@@ -96,7 +95,7 @@ class MarkingIn(Schema):
 
 
 class Layout(Schema):
-    """Markings of one's own in place of a template's name, and names for points of them."""
+    """Custom markings instead of a template, and names for points that can be clicked."""
 
     markings: Annotated[list[MarkingIn], Field(min_length=1, max_length=500)]
     points: Annotated[dict[Annotated[Name, Field(min_length=1)], PitchPoint], Field(max_length=1000)] = Field({})
@@ -117,16 +116,16 @@ TemplateName = Annotated[str, AfterValidator(_as_a_template), WithJsonSchema({"t
 
 
 class OtherField(Schema):
-    """The field of another sport on the same ground; it has its template's measures unless given."""
+    """A field of another sport on the same ground. Dimensions that are not given are the template's."""
 
     template: TemplateName
     length_m: Length | None = None
     width_m: Length | None = None
     line_width_m: PaintWidth | None = None
     measures_m: dict[str, Number] = Field({})
-    centre: PitchPoint = Field([0.0, 0.0], description="Where its centre is on the venue's field.")
+    centre: PitchPoint = Field([0.0, 0.0], description="Position of its centre on the venue's field, m.")
     turned_deg: Annotated[Number, Field(ge=-360, le=360)] = Field(
-        0.0, description="From the venue's x to its own, counter-clockwise seen from above."
+        0.0, description="Angle from the venue's x axis to its own, counter-clockwise seen from above."
     )
 
     @model_validator(mode="after")
@@ -142,7 +141,7 @@ class OtherField(Schema):
 
     @property
     def size(self) -> dict[str, float]:
-        """What its plan is drawn by, where that is not as usual."""
+        """Dimensions that differ from the template's, by name, m."""
         return size_of(dict(self))
 
 
@@ -161,7 +160,7 @@ def _usual_need_not_be_given(schema: dict[str, Any]) -> None:
 
 
 class FieldOfPlay(Schema):
-    """The pitch. `ridge`: the two ends of the roof's ridge (same y, same z), absent or null = flat."""
+    """The pitch. `ridge`: both ends of the ridge of a crowned pitch (same y, same z); absent or null: flat."""
 
     model_config = ConfigDict(json_schema_extra=_usual_need_not_be_given)
 
@@ -170,30 +169,30 @@ class FieldOfPlay(Schema):
         Discriminator(lambda given: "name" if isinstance(given, str) else "layout"),
     ] = Field(
         FOOTBALL,
-        description="The name of a sport's template, or markings of your own. Other names of a sport, such as `soccer` "
-        "or `ice hockey`, are stored as the template's.",
+        description="Name of a sport's template, or custom markings. Other names of a sport, such as `soccer` or "
+        "`ice hockey`, are stored as the template's name.",
     )
-    length_m: Length = Field(description="Along x; absent: the template's.")
-    width_m: Length = Field(description="Along y; absent: the template's.")
-    line_width_m: PaintWidth = Field(description="Absent: the template's.")
-    measures_m: dict[str, Number] = Field({}, description="What else a template leaves open, by name.")
+    length_m: Length = Field(description="Length along x; absent: the template's.")
+    width_m: Length = Field(description="Width along y; absent: the template's.")
+    line_width_m: PaintWidth = Field(description="Width of the lines; absent: the template's.")
+    measures_m: dict[str, Number] = Field({}, description="Other dimensions that the template lets you set, by name.")
     ridge: Annotated[list[Row], Field(min_length=2, max_length=2)] | None = None
     uneven_m: Annotated[Number, Field(ge=0.001, le=0.1)] | None = Field(
         None,
-        description="How far the ground is above or below its plane, or its roof: a standard deviation, m. Absent: as "
-        "usual for the template (0.015 on turf, 0.005 in a hall), that of turf for markings of your own.",
+        description="Unevenness of the ground: one standard deviation of its height around the plane, or around the "
+        "crowned surface, m. Absent: the template's (0.015 on turf, 0.005 indoors); turf's for custom markings.",
     )
     sigma: dict[FieldNumber, Annotated[Number, Field(gt=0, le=MOST_SIGMA_M)]] = Field(
         {},
-        description="How well numbers of the field are known: a standard deviation, m. Absent: as a tape that is "
-        "pulled with care leaves length and width (0.03 %), and 0.02 of a ridge. Say it where nobody has measured: "
-        "poses then say how far off that may put them.",
+        description="Uncertainty of the field's dimensions: one standard deviation by name, m. Absent: that of a "
+        "careful tape measurement for length and width (0.03 %), and 0.02 for the ridge. Give it if nobody has "
+        "measured the field: the sigma of poses then includes it.",
         examples=[{"length_m": 0.5, "width_m": 0.5}],
     )
     other_markings: Annotated[list[OtherMarking], Field(max_length=500)] = Field(
         [],
-        description="What else is painted on the ground: fields of other sports by their templates, or markings one by "
-        "one. Nothing is calibrated by them, and they do not count against a frame.",
+        description="Other paint on the ground: fields of other sports by template, or single markings. They are not "
+        "used for calibration, and do not count as unexpected lines.",
         examples=[[{"template": "american-football", "length_m": 109.728, "width_m": 48.768}]],
     )
 
@@ -203,7 +202,7 @@ class FieldOfPlay(Schema):
         template = given.get("template", FOOTBALL) if isinstance(given, dict) else None
         if not isinstance(template, str):
             return given
-        # Of a sport that is none, its name alone is told, and not that its measures are missing.
+        # An unknown sport is reported by its name alone, without complaints about missing dimensions.
         size = load(template_name(template) or FOOTBALL).size
         return {name: size[measure].default for name, measure in TEMPLATE_MEASURES.items()} | given
 
@@ -263,22 +262,22 @@ class FieldOfPlay(Schema):
         return self
 
     def number(self, name: FieldNumber) -> float:
-        """A number of the field, m; the ridge of a flat one is 0 m high."""
+        """Return a dimension of the field, m; the ridge height of a flat field is 0."""
         if name == "ridge_height_m":
             return 0.0 if self.ridge is None else self.ridge[0][2]
         value: float = getattr(self, name)
         return value
 
     def with_number(self, name: FieldNumber, value: float) -> FieldOfPlay:
-        """Return the field with another number, m. Raises `ValidationError` where its sport has no such field."""
+        """Return the field with another value of a dimension, m. Raises `ValidationError` if the sport forbids it."""
         return self.changed({"ridge": self._ridge_at(value)} if name == "ridge_height_m" else {name: value})
 
     def changed(self, values: dict[str, Any]) -> FieldOfPlay:
-        """Return the field with other values. Raises `ValidationError` where its sport has no such field."""
+        """Return the field with other values. Raises `ValidationError` if the sport forbids them."""
         return FieldOfPlay.model_validate(self.model_dump() | values)
 
     def _ridge_at(self, height_m: float) -> list[Row]:
-        """The ridge at another height; that of a flat field lies between hips of 45°, as calibrations take it to."""
+        """Return the ridge at another height; a flat field gets one between hips of 45°, as calibrations assume."""
         if self.ridge is not None:
             return [[x, y, height_m] for x, y, _ in self.ridge]
         end = max((self.length_m - self.width_m) / 2, 0.0)
@@ -286,7 +285,7 @@ class FieldOfPlay(Schema):
 
     @property
     def warnings(self) -> list[str]:
-        """A warning where length or width is the usual one of the sport and nobody says how well it is known."""
+        """Return a warning if length or width is the template's default and has no `sigma`."""
         if not isinstance(self.template, str) or not self.is_known:
             return []
         usual = load(self.template).size
@@ -306,37 +305,37 @@ class FieldOfPlay(Schema):
 
     @property
     def is_known(self) -> bool:
-        """False if it is drawn by a template that only a newer version has."""
+        """False if only a newer version has the template."""
         return not isinstance(self.template, str) or self.template in NAMES
 
     @property
     def plan(self) -> Template:
-        """Markings and named points, and how uneven their ground is."""
+        """Markings, named points and unevenness of the ground."""
         return plan_of(self._template, self.uneven_m)
 
     @property
     def markings(self) -> tuple[Shape, ...]:
-        """All that is painted of it."""
+        """Markings of the field with its dimensions."""
         return markings_of(self._template, self.size)
 
     @property
     def _template(self) -> str | dict[str, Any]:
-        """The name of a template, or a layout as `fields.plans` takes it."""
+        """Name of the template, or the layout as `fields.plans` takes it."""
         return self.template if isinstance(self.template, str) else self.template.model_dump()
 
     @property
     def others(self) -> list[Shape]:
-        """What else is painted on the ground."""
+        """Markings of `other_markings`."""
         return other_shapes([other.model_dump() for other in self.other_markings], self.size)
 
     @property
     def size(self) -> dict[str, float]:
-        """What the plan is drawn by."""
+        """Dimensions of the field by the template's names, m."""
         return size_of(dict(self))
 
 
 class LengthRefused(ValueError):  # noqa: N818
-    """A field has no such length: `limits` says why. The question after it is for people who may mean other units."""
+    """Raised for a length beyond the template's `limits`; the message also asks if another unit was meant."""
 
     def __init__(self, limits: str, question: str) -> None:
         super().__init__(limits + question)

@@ -1,4 +1,4 @@
-"""What a file is by its first bytes, to tell its sender what came where a picture was expected."""
+"""Recognition of file types by their first bytes, for error messages about files that are no JPEG or PNG."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ STARTS = {
     b"\x1a\x45\xdf\xa3": "a video (Matroska or WebM)",
     b"\0\0\0\x01": "a video (raw H.264 or H.265)",
 }
-# Of the file: a page may begin with comments and line breaks.
+# Bytes that are examined: a web page may begin with comments and line breaks.
 LOOKED_AT = 512
 
 
 def kind_of_file(data: bytes) -> str | None:
-    """Return in a word or two what a file is that is neither JPEG nor PNG; None if it is not known."""
+    """Return the type of a file that is neither JPEG nor PNG, in words; None if it is unknown."""
     head = bytes(data[:LOOKED_AT])
     if head[4:8] == b"ftyp":
         brand = BRANDS.get(head[8:12], "a video (MP4)")
@@ -47,7 +47,7 @@ def kind_of_file(data: bytes) -> str | None:
 
 
 def jpeg_begins_at(data: bytes) -> int:
-    """Return where the picture of a file begins that viewers show as JPEG, 0 of all others.
+    """Return the offset at which the JPEG of a file begins, 0 for all other files.
 
     Some cameras send a line break before the file, or say twice that it begins; decoders take neither.
     """

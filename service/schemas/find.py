@@ -1,4 +1,4 @@
-"""Cameras without poses: what may be known of them, and the venue that they become once they are found."""
+"""Input of a search for cameras, and the venue that is made of its result."""
 
 from __future__ import annotations
 
@@ -17,27 +17,28 @@ from service.schemas.venue import Camera, CameraIn, Ignore, NamedField, Venue, V
 FieldSide = Annotated[
     Literal["near", "far", "left", "right"],
     OPEN_WORD,
-    Field(description="Of the field that a camera stands on: near is y < 0, far y > 0, left x < 0, right x > 0."),
+    Field(description="Side of the field that a camera stands on: near is y < 0, far y > 0, left x < 0, right x > 0."),
 ]
 
 
 class SoughtCameraIn(Schema):
-    """A camera whose pose is sought; whatever is known of it makes that quicker and surer."""
+    """A camera whose pose is searched for. Whatever is known about it makes the search faster and more reliable."""
 
     id: Id
     image_size: Annotated[list[Side], Field(min_length=2, max_length=2)] | None = Field(
-        None, description="Width, height in pixels. Absent: that of its frame."
+        None, description="Width, height in pixels. Absent: the size of its frame."
     )
     intrinsics: Intrinsics | None = Field(
         None,
-        description="Its lens. With a `sigma` of `fx` above 2 % of it, the focal length is searched for. Absent: lens "
-        "and pose are found together.",
+        description="Lens of the camera. The focal length is searched for, too, if the `sigma` of `fx` is above 2 %. "
+        "Absent: lens and pose are found together.",
     )
     field_of_view_deg: Annotated[Number, Field(ge=5, le=150)] | None = Field(
-        None, description="Horizontal, roughly, where the lens is not known: focal lengths up to 30 % off are tried."
+        None,
+        description="Approximate horizontal field of view of an unknown lens: focal lengths within 30 % are tried.",
     )
-    pose: PoseIn | None = Field(None, description="Of a camera that need not be found.")
-    position: Position | None = Field(None, description="Roughly where it stands, m: within `position_radius_m`.")
+    pose: PoseIn | None = Field(None, description="Pose of a camera that need not be found.")
+    position: Position | None = Field(None, description="Approximate position, m: within `position_radius_m`.")
     position_radius_m: Annotated[Number, Field(gt=0, le=1000)] = 10.0
     side: FieldSide | None = None
     ignore: Ignore = Field([])
@@ -56,7 +57,7 @@ class SoughtCameraIn(Schema):
 
 
 class SoughtSite(NamedField):
-    """The file of a venue whose cameras may lack poses, and lenses."""
+    """A venue whose cameras may lack poses and lenses, as the part `site` of a request has it."""
 
     cameras: Annotated[list[SoughtCameraIn], Field(min_length=1, max_length=32)]
 
@@ -67,23 +68,21 @@ class SoughtSite(NamedField):
 
     @property
     def sought(self) -> list[str]:
-        """The ids of the cameras that are to be found: those without a pose."""
+        """Ids of the cameras to find: those without a pose."""
         return [camera.id for camera in self.cameras if camera.pose is None]
 
     @classmethod
     def of(cls, venue: Venue, options: FindOptions, with_frames: Collection[str]) -> SoughtSite:
-        """A stored venue whose cameras are to be found again: those of the options, or all that have frames."""
+        """Return the site of a stored venue; the cameras of the options, or all that have frames, lose their poses."""
         sought = with_frames if options.cameras is None else options.cameras
         cameras = [_sought(one, options) if one.id in sought else _known(one) for one in venue.cameras]
         return cls(id=venue.id, name=venue.name, field=venue.field, cameras=cameras)
 
     def completed(self, result: FindResult, chosen: Mapping[str, CandidateResult]) -> VenueIn:
-        """The venue of the cameras that were known and of those that were found, in the order of the site.
+        """Return the venue of the known and found cameras, in the order of the site, with the ridge if one was found.
 
-        With the ridge that was found, if one was.
-
-        `chosen`: the candidate that each found camera is taken to be; a sought camera without one is left out. Raises
-        `ValidationError` where that leaves no camera, or a candidate is none that a venue can have.
+        `chosen`: the candidate for each found camera; a camera without one is left out. Raises `ValidationError` if no
+        camera remains, or a candidate is not valid in a venue.
         """
         sizes = {camera.id: camera.image_size for camera in result.cameras}
         placed = [_placed(one, chosen.get(one.id), sizes.get(one.id)) for one in self.cameras]
@@ -93,7 +92,7 @@ class SoughtSite(NamedField):
 
 
 def _sought(camera: Camera, options: FindOptions) -> SoughtCameraIn:
-    """A stored camera that is looked for, with what of it is said to hold still."""
+    """Return a stored camera as one to find, with the lens and position that the options keep."""
     sought = SoughtCameraIn(
         id=camera.id,
         image_size=camera.image_size,
@@ -114,7 +113,7 @@ def _known(camera: Camera) -> SoughtCameraIn:
 
 
 def _placed(camera: SoughtCameraIn, found: CandidateResult | None, size: list[int] | None) -> CameraIn | None:
-    """A camera with the pose that is known or was found; None: it is sought, and none of its candidates is taken."""
+    """Return a camera with its known or found pose; None if it is to be found and has no chosen candidate."""
     kept = {"id": camera.id, "ignore": camera.ignore, "source": camera.source}
     if camera.pose is not None:
         return CameraIn(**kept, image_size=camera.image_size, intrinsics=camera.intrinsics, pose=camera.pose)

@@ -1,4 +1,4 @@
-"""What a schema found wrong with a document, in words that name the part as whoever wrote it does."""
+"""Validation errors of pydantic in words for people who write documents."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Location = tuple[str | int, ...]
 MAX_PREVIEW_LENGTH = 40
 MAX_NAME_LENGTH = 64
 MAX_SUGGESTIONS = 20
-"""So many misspelt names are looked up: that of all in a document made for it would take the service minutes."""
+"""Most misspelt names that are looked up: a malicious document with thousands would take minutes."""
 
 EXPECTED = {
     "float_type": "a number",
@@ -41,7 +41,7 @@ EXPECTED = {
     "url_parsing": "an address such as https://host.example/path",
     "url_scheme": "an address that begins with {expected_schemes}",
 }
-"""By the kinds of pydantic, with what it says of each."""
+"""Expected values by pydantic's error types; fields come from the error's context."""
 UNITS = {
     "_m": " m",
     "_px": " px",
@@ -57,7 +57,7 @@ UNITS = {
     "position": " m",
     "translation": " m",
 }
-"""By the ends of names."""
+"""Units by the ends of field names."""
 EXPECTED_PATTERN = {
     ID_PATTERN: f"an id, {ID_IN_WORDS}",
     JOB_ID_PATTERN: "the id of a job, 26 capital letters and digits",
@@ -65,25 +65,25 @@ EXPECTED_PATTERN = {
     COLOUR_PATTERN: f"{', '.join(COLOURS)} or #rrggbb",
     CHARUCO_PATTERN: "the name of a dictionary of OpenCV, such as 4X4_50",
 }
-"""By the patterns of the schemas, which are for programs."""
+"""Descriptions of the schemas' regular expressions."""
 EXPECTED_LENGTH = {
     "too_short": "at least {min_length} entries, came {actual_length}",
     "too_long": "at most {max_length} entries, came {actual_length}",
     "string_too_short": "at least {min_length} characters",
     "string_too_long": "at most {max_length} characters",
 }
-"""What came is too long to be shown, or a secret."""
+"""Expected lengths by error type. The value is not repeated: it is long, or a secret."""
 NOT_METRES = "it is in metres: are these centimetres or millimetres?"
 OTHER_UNITS = {
     "rotation": "it is a Rodrigues vector in radians, and these look like degrees",
     "position": NOT_METRES,
     "translation": NOT_METRES,
 }
-"""By the name of a vector, what a number beyond its limits says of all of them."""
+"""Hints by vector name, for a component beyond its limits."""
 
 
 def describe_errors(findings: Sequence[Mapping[str, Any]], model: Any, document: Any) -> list[str]:
-    """Each of pydantic's errors. `model`: the type that the `document` should have had; None: not known."""
+    """Return a sentence for each of pydantic's errors. `model`: the expected type of `document`; None if unknown."""
     unknown = [finding["loc"] for finding in findings if finding["type"] == "extra_forbidden"]
     meant = {place: _suggestion(place, model) for place in unknown[:MAX_SUGGESTIONS]}
     return [_describe_error(finding, _path_with_ids(finding["loc"], document), meant) for finding in findings]
@@ -114,13 +114,13 @@ def _described_pattern(pattern: str, given: str) -> str:
 
 
 def _unit(place: Location) -> str:
-    """The unit of a number, by the name of the field that it stands in; empty where it has none."""
+    """Return the unit of a number by the name of its field; empty without one."""
     name = next((step for step in reversed(place) if isinstance(step, str)), "")
     return next((unit for end, unit in UNITS.items() if name.endswith(end)), "")
 
 
 def _other_unit(finding: Mapping[str, Any]) -> str:
-    """The unit that a number beyond its limits was most likely written in."""
+    """Return a hint at the wrong unit that a number beyond its limits was probably written in."""
     if finding["type"] not in ("less_than_equal", "greater_than_equal"):
         return ""
     of = [OTHER_UNITS[step] for step in finding["loc"] if step in OTHER_UNITS]
@@ -130,7 +130,7 @@ def _other_unit(finding: Mapping[str, Any]) -> str:
 
 
 def _path_with_ids(place: Location, document: Any) -> str:
-    """Where something is, with the ids of what has one, and nothing of how the schema came there."""
+    """Return the path of an error in the document, with ids in place of list indices and without union tags."""
     steps = []
     for number, step in enumerate(place, start=1):
         inside = _member(document, step)
@@ -156,7 +156,7 @@ def _has_id(document: Any) -> bool:
 
 
 def _suggestion(place: Location, model: Any) -> str:
-    """The field that was most likely meant, or else all that there are."""
+    """Return the field that a misspelt name is closest to, or else all known fields."""
     *way, wrong = place
     models = _models(model)
     for step in way:
@@ -171,7 +171,7 @@ def _suggestion(place: Location, model: Any) -> str:
 
 
 def _models(annotation: Any) -> list[type[BaseModel]]:
-    """The models that something of this type may be, or be made of."""
+    """Return the models that an annotation mentions."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         root = annotation.model_fields.get("root")
         return [annotation] if root is None else _models(root.annotation)

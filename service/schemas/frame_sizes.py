@@ -1,21 +1,21 @@
-"""Whether a frame shows what its camera's lens was measured for: the same picture, if at another size."""
+"""Comparison of a frame's size with the image size of its camera, and messages about a mismatch."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 SAME_ASPECT = 0.005
-"""Part by which the shapes of two sizes of one picture differ: encoders round to whole blocks, as 1366x768 of 16:9."""
+"""Relative tolerance of aspect ratios: encoders round to whole blocks, such as 1366x768 for 16:9."""
 
 
 def is_resized(size: Sequence[int], image_size: Sequence[int]) -> bool:
-    """Return whether a frame of this size may be the picture of the camera's `image_size`, larger or smaller."""
+    """True if a frame of this size may be the picture of `image_size`, scaled."""
     (width, height), (expected_width, expected_height) = size, image_size
     return abs(width * expected_height / (height * expected_width) - 1) <= SAME_ASPECT
 
 
 def resized_remark(camera: str, size: Sequence[int], image_size: Sequence[int]) -> str:
-    """Return what to tell of a frame that is enlarged or reduced to the size of its camera."""
+    """Return the remark about a frame that is resized to the size of its camera."""
     (width, height), (expected_width, expected_height) = size, image_size
     return (
         f"camera {camera} sent {width}x{height} pixels, and its lens is for {expected_width}x{expected_height}: the "
@@ -24,7 +24,7 @@ def resized_remark(camera: str, size: Sequence[int], image_size: Sequence[int]) 
 
 
 def other_size(camera: str, size: Sequence[int], image_size: Sequence[int]) -> str:
-    """Return why points that were clicked in a frame of another size are refused."""
+    """Return the reason for refusing points that were clicked in a frame of another size."""
     return (
         f"Send camera {camera} in {image_size[0]}x{image_size[1]} pixels, the size of its intrinsics, in which points "
         f"are clicked; this frame has {size[0]}x{size[1]}."
@@ -32,7 +32,7 @@ def other_size(camera: str, size: Sequence[int], image_size: Sequence[int]) -> s
 
 
 def other_shape(camera: str, size: Sequence[int], image_size: Sequence[int]) -> str:
-    """Return why a frame of another shape is refused, and what would do."""
+    """Return the reason for refusing a frame of another aspect ratio, with sizes that would be taken."""
     (width, height), (expected_width, expected_height) = size, image_size
     expected = f"{expected_width}x{expected_height}"
     if [width, height] == [expected_height, expected_width]:

@@ -1,4 +1,4 @@
-"""Poses, lenses and how far a camera moved.
+"""Models of poses, lenses and camera movements.
 
 World: right-handed, metres, origin at the pitch centre on z = 0, x along the touchline, y across the pitch, z up.
 Cameras are OpenCV's: x right, y down, z forward, pixel centres at integers.
@@ -21,13 +21,13 @@ COEFFICIENTS: dict[LensModel, tuple[str, ...]] = {
     "opencv": ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4", "tau_x", "tau_y"),
     "fisheye": ("k1", "k2", "k3", "k4"),
 }
-# Of a camera matrix: both focal lengths, the ratio fy/fx, the principal point.
+# Parameters of a camera matrix: both focal lengths, the ratio fy/fx, the principal point.
 MATRIX_NUMBERS = ("fx", "fy", "aspect", "cx", "cy")
 LARGEST_SIDE = 16384
-# A position and a translation that are less apart say the same: more is not lost by writing them down.
+# A position and a translation agree within this: rounding of decimal numbers stays below it.
 AGREEING_M = 1e-6
-# From the middle of the field, m: a camera that is 2000 m away along each axis. It is a distance, which position and
-# translation share, so that a pose that is sent in one of them is a valid pose in the other, to the micrometre.
+# Largest distance from the centre of the field, m: 2000 m along each axis. Position and translation have the same
+# length, so that a pose which is valid in one convention is valid in the other.
 FARTHEST_M = 3465.0
 Metres = Annotated[Number, Field(ge=-2000, le=2000)]
 Radians = Annotated[Number, Field(ge=-10, le=10)]
@@ -41,7 +41,7 @@ Deviation = Annotated[Number, Field(ge=LEAST_SIGMA, le=LARGEST_SIGMA)]
 
 
 class PoseIn(Schema):
-    """Where a camera stands and looks: `rotation` with `position`, `translation`, or both where they agree."""
+    """Pose of a camera: `rotation`, and `position` or `translation`, or both if they agree."""
 
     rotation: Rotation = Field(description="Rodrigues vector, rad, world to camera.")
     position: Position | None = Field(None, description="Camera centre in the world, m.")
@@ -69,7 +69,7 @@ class PoseIn(Schema):
 
 
 class Pose(Schema):
-    """Where a camera stands and looks, in both conventions."""
+    """Pose of a camera: rotation, and its place as position and as OpenCV's translation."""
 
     rotation: list[float] = Field(description="Rodrigues vector, rad, world to camera.")
     position: list[float] = Field(description="Camera centre in the world, m.")
@@ -77,13 +77,13 @@ class Pose(Schema):
 
     @classmethod
     def from_position(cls, rotation: list[float], position: list[float]) -> Pose:
-        """From rotation vector and camera centre."""
+        """Return the pose of a rotation vector (rad) and a camera centre (m)."""
         translation = [-component for component in rotate(rotation, position)]
         return cls(rotation=rotation, position=position, translation=translation)
 
     @classmethod
     def from_input(cls, pose: PoseIn) -> Pose:
-        """From a pose as it was sent, which stays to the last digit what it was when it was read."""
+        """Return the pose of a request, whose numbers are kept to the last digit."""
         if pose.translation is None:
             assert pose.position is not None
             return cls.from_position(pose.rotation, pose.position)
@@ -101,20 +101,21 @@ class Intrinsics(Schema):
     matrix: Annotated[list[Row], Field(min_length=3, max_length=3)]
     distortion: Annotated[
         list[Annotated[Number, Field(ge=-LARGEST_COEFFICIENT, le=LARGEST_COEFFICIENT)]], Field(max_length=14)
-    ] = Field(description="0, 4, 5, 8, 12 or 14 numbers; of a fisheye 0 or 4.")
+    ] = Field(description="0, 4, 5, 8, 12 or 14 coefficients; 0 or 4 for `fisheye`.")
     sigma: dict[str, Deviation] | None = Field(
         None,
-        description="How well the lens is known: one standard deviation by name, of fx, fy, cx and cy in pixels, of "
-        "aspect (fy/fx) and of the coefficients (k1, k2, p1 ... in OpenCV's order) as they are. Numbers that are not "
-        "named are taken to be as sure as photos of a board leave them that reached every corner of the picture.",
+        description="Uncertainty of the lens: one standard deviation by parameter; fx, fy, cx and cy in pixels, aspect "
+        "(fy/fx) and the coefficients (k1, k2, p1 ... in OpenCV's order) without unit. Parameters that are not named "
+        "get the uncertainty of a good board calibration that covered the whole picture.",
         examples=[{"fx": 4.0, "fy": 4.0, "cx": 6.0, "cy": 5.0, "k1": 0.002, "k2": 0.004}],
         json_schema_extra={"propertyNames": {"enum": [*MATRIX_NUMBERS, *COEFFICIENTS["opencv"]]}},
     )
     sigma_from: Annotated[SigmaSource, OPEN_WORD] | None = Field(
         None,
-        description="What `sigma` was estimated from, where that is used again: `lines`, for a lens that a search has "
-        "found with the pose. Calibrations ask the same lines, and take such a lens to be unknown: the sigma of a pose "
-        "is as large as that of the search. Absent: photos of a board, or another independent measurement.",
+        description="Data that `sigma` was estimated from, if calibrations use it again: `lines`, for a lens that a "
+        "search found together with the pose. Calibrations see the same lines and treat such a lens as unknown, so "
+        "that the sigma of a pose stays as large as the search's. Absent: photos of a board, or another independent "
+        "measurement.",
     )
 
     @model_validator(mode="after")
@@ -144,24 +145,24 @@ class Intrinsics(Schema):
 
     @property
     def without_sigma(self) -> Intrinsics:
-        """The lens itself, and not how well it is known: lenses that image alike have the same."""
+        """The lens without its uncertainty, for comparing lenses."""
         return self.model_copy(update={"sigma": None, "sigma_from": None})
 
     def with_sigma_of(self, other: Intrinsics) -> Intrinsics:
-        """This lens; where the other one is the same, as well known as that."""
+        """Return this lens, with the uncertainty of `other` if both are the same lens."""
         return other if other.without_sigma == self.without_sigma else self
 
 
 class Light(Schema):
-    """What is done to a camera's picture so that it agrees with the others' where they overlap in a stitched view.
+    """Photometric correction of a camera, so that it matches the other cameras of a stitched view where they overlap.
 
-    A tone t of 0 to 255 becomes `gain` * 100 * (t / 100) ** (1 + `contrast`), and that is multiplied by
-    exp(`falloff` * r²), r from 0 in the middle of the frame to 1 in its corners. `reach`: the logarithm by which the
-    camera counts more than how finely it sees, which moves the seams between it and others.
+    A value t of 0 to 255 becomes `gain` * 100 * (t / 100) ** (1 + `contrast`), times exp(`falloff` * r²), r from 0 in
+    the middle of the frame to 1 in its corners. `reach`: logarithm of an extra weight of the camera, which moves its
+    seams.
     """
 
     gain: Annotated[list[Annotated[Number, Field(ge=0.25, le=4)]], Field(min_length=3, max_length=3)] = Field(
-        description="Of red, green and blue.", examples=[[1.06, 1.0, 0.94]]
+        description="Gain of red, green and blue.", examples=[[1.06, 1.0, 0.94]]
     )
     contrast: Annotated[Number, Field(ge=-0.5, le=0.5)] = 0.0
     falloff: Annotated[Number, Field(ge=-1, le=1)] = 0.0
@@ -169,13 +170,13 @@ class Light(Schema):
 
 
 def require_camera_id(camera_id: str) -> None:
-    """Raise `ValueError` for an id that no camera can have."""
+    """Raise `ValueError` for an id that is reserved."""
     if camera_id == OPTIONS_PART:
         raise ValueError("a camera cannot be called 'options': that is a part of the upload")
 
 
 def check_lens(lens: Intrinsics, image_size: list[int]) -> None:
-    """Raise `ValueError` for a lens that is sent and has no rays for its picture; one that is stored was taken once."""
+    """Raise `ValueError` for a lens in a request that has no rays for its picture; stored lenses were checked once."""
     if lens.model not in DISTORTION_LENGTHS:
         return
     try:
@@ -190,7 +191,7 @@ def check_lens(lens: Intrinsics, image_size: list[int]) -> None:
 
 
 class UnposedCamera(Schema):
-    """What a camera is, but for its pose."""
+    """A camera without its pose: id, image size and lens."""
 
     id: Id
     image_size: Annotated[list[Side], Field(min_length=2, max_length=2)] = Field(description="Width, height in pixels.")
@@ -202,33 +203,33 @@ class UnposedCamera(Schema):
         (fx, _, cx), (_, fy, cy), _ = self.intrinsics.matrix
         width, height = self.image_size
         for focal, centre, size in ((fx, cx, width), (fy, cy, height)):
-            # From wider than any fisheye to longer than any broadcast lens: millimetres show here. A matrix of another
-            # resolution is doubted in words (`lens_map`): a picture may have been cut.
+            # From wider than any fisheye to longer than any broadcast lens: focal lengths in millimetres fail here. A
+            # matrix of another resolution only gets a warning (`lens_map`): the picture may be a crop.
             if not 0.1 * size <= focal <= 200 * size or not -size <= centre <= 2 * size:
                 raise ValueError(f"the camera matrix does not belong to an image of {width}x{height} pixels")
         return self
 
 
 class PosedCamera(UnposedCamera):
-    """A camera as it stands: its lens, and where it is and looks."""
+    """A camera with lens and pose."""
 
     pose: Pose
 
     @property
     def pose_and_lens(self) -> PosedCamera:
-        """Where it stands and how it images, and not how well its lens is known."""
+        """The camera without the uncertainty of its lens."""
         return self.model_copy(update={"intrinsics": self.intrinsics.without_sigma})
 
 
 class LensFile(BaseModel):
-    """The part of the file of a lens, as `esc intrinsics` writes it, that a camera needs."""
+    """The part of a lens file of `esc intrinsics` that a camera needs."""
 
     image_size: Annotated[list[Side], Field(min_length=2, max_length=2)]
     intrinsics: Intrinsics
 
 
 class Moved(Schema):
-    """From the stored pose to the new one; `pixels`: mean shift of the visible pitch."""
+    """Movement from one pose to another; `pixels`: mean shift of the visible pitch in the picture."""
 
     rotation_deg: float
     position_m: float
@@ -236,8 +237,8 @@ class Moved(Schema):
 
 
 class Movement(Schema):
-    """How a camera stands against others of its states; null: there was none, or it is not known."""
+    """Movement of a camera since earlier revisions; null: there was none, or it is unknown."""
 
-    moved: Moved | None = Field(description="Since the revision before.")
-    drift: Moved | None = Field(description="Since the revision `drift_since`.")
-    drift_since: int = Field(description="The last revision in which the camera was put where it is: the first pose.")
+    moved: Moved | None = Field(description="Movement since the previous revision.")
+    drift: Moved | None = Field(description="Movement since the revision `drift_since`.")
+    drift_since: int = Field(description="The last revision in which somebody set the camera's pose.")

@@ -1,4 +1,4 @@
-"""How a service and its venues are doing: the rules of alarms, what rings, and what is told of it."""
+"""Models of the health of a service and its venues, of alarm rules and active alarms."""
 
 from __future__ import annotations
 
@@ -23,37 +23,37 @@ ALARMS_EXAMPLE: dict[str, Any] = {
 
 
 class Alarms(Schema):
-    """When to sound the alarm about a venue; each rule may be left out."""
+    """Alarm rules of a venue; each is optional."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [ALARMS_EXAMPLE]})
 
     moved_since_last_px: Annotated[Number, Field(gt=0)] | None = Field(
-        None, description="A calibration moves the pitch in the picture of a camera by more than this."
+        None, description="A calibration moves the pitch in a camera's picture by more than this."
     )
     moved_since_first_px: Annotated[Number, Field(gt=0)] | None = Field(
-        None, description="A camera's picture is further than this from where the camera was put."
+        None, description="The pitch in a camera's picture is further than this from where its first pose put it."
     )
     rejected_in_a_row: Annotated[Integer, Field(ge=1, le=1000)] | None = Field(
-        None, description="So many calibrations one after the other fail, or bring no pose of a camera or of any."
+        None, description="This many calibrations in a row fail, or bring no accepted pose (of one camera, or at all)."
     )
     not_calibrated_for_h: Annotated[Number, Field(gt=0, le=10000)] | None = Field(
-        None, description="No pose is accepted for so many hours, of a camera or of any."
+        None, description="No pose (of one camera, or at all) is accepted for this many hours."
     )
     trend_m: Annotated[Number, Field(gt=0, le=100)] | None = Field(
         None,
-        description="Over nights, a camera moves beyond what its own spread explains, and by at least so many metres "
-        "at the far touchline, see `GET /venues/{id}/cameras/{camera}/trend`.",
+        description="Over nights, a camera drifts beyond its usual spread, and by at least this many metres at the far "
+        "touchline, see `GET /venues/{id}/cameras/{camera}/trend`.",
     )
     knocked: Flag = Field(
-        False, description="A calibration finds a camera elsewhere, and nobody has accepted its pose there yet."
+        False, description="A calibration finds a knocked camera elsewhere, and nobody has accepted its new pose yet."
     )
     live: Flag = Field(
         False,
-        description="Of live poses: a tracked camera is not measured for 10 s, its poses are sent more than 1 s after "
-        "their pictures for a minute, or the process that sends them has not reported for 30 s.",
+        description="Live poses have trouble: a tracked camera is not measured for 10 s, its poses are sent more than "
+        "1 s after their pictures for a minute, or the process that sends them has not reported for 30 s.",
     )
     callback_url: CallbackUrl | None = Field(
-        None, description="Told when an alarm begins and when it is over, signed (Standard Webhooks)."
+        None, description="Gets a signed POST (Standard Webhooks) when an alarm begins and when it ends."
     )
 
 
@@ -91,12 +91,12 @@ SETTINGS: dict[AlarmRule, AlarmSetting] = {
 
 
 class Alarm(Schema):
-    """An alarm that rings, of one camera or (null) of the whole venue."""
+    """An active alarm of one camera, or of the whole venue (`camera` is null)."""
 
     rule: Annotated[AlarmRule, OPEN_WORD]
     setting: Annotated[AlarmSetting, OPEN_WORD] | None = Field(
         default_factory=lambda alarm: SETTINGS.get(alarm["rule"]),
-        description="The rule's name in the venue's `alarms`; null of a rule that only a newer version knows.",
+        description="Name of the rule in the venue's `alarms`; null for a rule that only a newer version knows.",
     )
     camera: Id | None
     since: datetime
@@ -104,7 +104,7 @@ class Alarm(Schema):
 
 
 class CalibrationEnd(Schema):
-    """The last calibration of a venue that ended; what needs a result is None without one."""
+    """The last calibration of a venue that ended; without a result, the fields that need one are null."""
 
     status: Annotated[JobStatus, OPEN_WORD]
     finished_at: datetime
@@ -115,47 +115,47 @@ class CalibrationEnd(Schema):
 
 
 class CameraHealth(RevisionCamera):
-    """Where a camera stands, and how its calibrations went."""
+    """Current pose of a camera and its movements, and how its recent calibrations ended."""
 
-    accepted_at: datetime | None = Field(description="When its pose was last accepted.")
-    rejected_in_a_row: int = Field(description="Calibrations since then that failed or did not bring its pose.")
+    accepted_at: datetime | None = Field(description="Time at which its pose was last accepted.")
+    rejected_in_a_row: int = Field(description="Calibrations since then without an accepted pose of this camera.")
 
 
 class VenueHealth(Schema):
-    """How a venue is doing. `state` is `alarm` while one of its alarms rings."""
+    """Health of a venue. `state` is `alarm` while one of its alarms is active."""
 
     state: Annotated[Literal["ok", "alarm"], OPEN_WORD]
     alarms: list[Alarm]
-    revision: int = Field(description="The one that holds.")
-    cameras: list[CameraHealth] = Field(description="Where they stand, and how far that is from where they were put.")
-    stitch_error_px: float | None = Field(description="Of the poses that hold, by the last result.")
-    accepted_at: datetime | None = Field(description="When poses were last accepted, of any camera.")
-    rejected_in_a_row: int = Field(description="Calibrations since then that failed or brought no pose at all.")
+    revision: int = Field(description="Number of the current revision of the poses.")
+    cameras: list[CameraHealth] = Field(description="Current poses of the cameras and their movements.")
+    stitch_error_px: float | None = Field(description="Stitch error of the current poses, by the last result.")
+    accepted_at: datetime | None = Field(description="Time at which a pose of any camera was last accepted.")
+    rejected_in_a_row: int = Field(description="Calibrations since then without any accepted pose.")
     schedule: ScheduleState | None = None
 
 
 class VenueAlarm(Alarm):
-    """An alarm with its venue."""
+    """An alarm and the id of its venue."""
 
     venue: Id
 
 
 class AlarmEvent(Attributed):
-    """What the `callback_url` of a venue's alarms gets, at least once: an alarm began, or is over.
+    """Event of an alarm that began or ended, sent to the `callback_url` of a venue's alarms at least once.
 
     Every attempt has the same `webhook-id`.
     """
 
     type: Literal["alarm.began", "alarm.ended"]
-    timestamp: datetime = Field(description="When it began or ended.")
+    timestamp: datetime = Field(description="Time at which the alarm began or ended.")
     data: VenueAlarm
 
 
 class Health(Schema):
-    """Whether the process can answer, and what each part of the service says."""
+    """Readiness of an API process, and the state of each part of the service."""
 
     status: Annotated[Literal["ok", "unavailable"], OPEN_WORD]
-    parts: dict[str, str] = Field({}, description="Each part, `ok` or what is wrong with it.")
+    parts: dict[str, str] = Field({}, description="State of each part: `ok`, or what is wrong with it.")
     warnings: dict[str, str] = Field(
-        {}, description="The parts that are missing while this process answers all the same: jobs wait or fail."
+        {}, description="Parts that are missing although this process can answer: meanwhile jobs wait or fail."
     )

@@ -1,4 +1,4 @@
-"""What the poses of a venue were, and how far its cameras moved."""
+"""Models of the history of a venue's poses, and of requests that restore or adopt poses."""
 
 from __future__ import annotations
 
@@ -14,27 +14,27 @@ from service.schemas.names import JOB_ID_PATTERN, FieldNumber
 
 
 class RevisionCamera(Movement):
-    """A camera in a revision of its venue."""
+    """Pose and movement of a camera in a revision of its venue."""
 
     id: Id
     pose: Pose
 
 
 class NumberChange(Schema):
-    """A number of the field before a revision and since, m."""
+    """Value of a dimension of the field before and after a revision, m."""
 
     before: float
     after: float
 
 
-# What brought a revision: a PUT, a calibration by itself, one that found a knocked camera again, a result that was
-# accepted by hand, an older revision, or, by hand as well, the refined pose and lens of a camera or a number of the
-# field as the lines have it, or cameras that a job found from their frames alone.
+# Causes of revisions: put: PUT or PATCH; calibrated: an accepted calibration; recovered: a calibration that found a
+# knocked camera again; accepted: a result accepted by hand; restored: an older revision; adopted: the refined pose and
+# lens of a camera, or a dimension of the field; found: cameras that a search found from their frames.
 Cause = Literal["put", "calibrated", "recovered", "accepted", "restored", "adopted", "found"]
 
 
 class Revision(Schema):
-    """The poses that a venue had from a moment on, with the lenses and the ridge that they belong to."""
+    """Poses of a venue from a moment on, with the lenses and the ridge that they belong to."""
 
     model_config = ConfigDict(
         json_schema_extra={
@@ -66,18 +66,20 @@ class Revision(Schema):
         }
     )
 
-    revision: int = Field(description="Counts from 1; the newest holds now.")
+    revision: int = Field(description="Number of the revision, from 1; the newest is in use.")
     at: datetime
     cause: Annotated[Cause, OPEN_WORD]
-    job: str | None = Field(description="Whose poses these are; of a restored one, whose were rejected by hand.")
-    restored_from: int | None = Field(description="The revision that was put back.")
-    stitch_error_px: float | None = Field(description="As the job said; null: nobody measured it.")
+    job: str | None = Field(
+        description="Job that found these poses; for a restored revision, the job whose poses were rejected by hand."
+    )
+    restored_from: int | None = Field(description="Number of the revision that was restored.")
+    stitch_error_px: float | None = Field(description="Stitch error by the job; null: not measured.")
     ridge: list[Row] | None
     field_numbers: dict[Annotated[FieldNumber, OPEN_WORD], NumberChange] = Field(
-        {}, description="Numbers of the field that were adopted with it, or put back, by name; {} of any other."
+        {}, description="Dimensions of the field that were adopted or restored with it, by name; otherwise {}."
     )
     cameras: list[RevisionCamera]
-    by: Actor | None = Field(None, description=f"{BY} Of a calibration: who asked for it.")
+    by: Actor | None = Field(None, description=f"{BY} For a calibration: its submitter.")
 
 
 class History(Schema):
@@ -89,7 +91,7 @@ class History(Schema):
 
 
 class Restore(Schema):
-    """Which revision is to hold again."""
+    """Request to restore the poses of a revision."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [{"revision": 1}]})
 
@@ -97,7 +99,7 @@ class Restore(Schema):
 
 
 class AdoptField(Schema):
-    """Which number of the field is to be stored as the lines of which job have it, see `adoptable` of its result."""
+    """Request to store a dimension of the field as a job measured it, see `adoptable` of its result."""
 
     model_config = ConfigDict(
         json_schema_extra={"examples": [{"job": "01KAJ3Q6WZ5T3Y8R0N4M2C7B1D", "name": "ridge_height_m"}]}
@@ -108,7 +110,7 @@ class AdoptField(Schema):
 
 
 class AdoptFound(Schema):
-    """Which cameras that a job found are to be stored."""
+    """Request to store cameras that a search found."""
 
     model_config = ConfigDict(
         json_schema_extra={"examples": [{"job": "01KAJ3Q6WZ5T3Y8R0N4M2C7B1D", "candidates": {"right": 2}}]}
@@ -118,6 +120,6 @@ class AdoptFound(Schema):
     candidates: dict[Id, Annotated[Integer, Field(ge=1, le=100)] | None] = Field(
         {},
         json_schema_extra={"additionalProperties": False},
-        description="The candidate that a camera is taken to be, from 1; null: none of them, the camera keeps its pose "
-        "or, of a new venue, is left out. A camera that is not named is its first candidate if that is accepted.",
+        description="Number of the chosen candidate by camera, from 1; null: none, the camera keeps its pose or is "
+        "left out of a new venue. A camera that is not named takes its first candidate if that is accepted.",
     )

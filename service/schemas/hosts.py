@@ -10,18 +10,18 @@ from service.schemas.addresses import IpAddress, ip_of
 
 
 def may_be_permitted(host: str, allowed: Sequence[str]) -> bool:
-    """Whether a host, which is not looked up yet, can turn out to be allowed."""
+    """True if a host may be allowed: by its name, or possibly by the addresses that a look-up will give."""
     may_lead_there = ip_of(host) is None and bool(_networks(allowed))
     return is_permitted(host, [host], allowed) or may_lead_there
 
 
 def is_permitted(host: str, addresses: Collection[str], allowed: Sequence[str]) -> bool:
-    """Whether a host is allowed: by its name, or by every address that its name leads to."""
+    """True if a host is allowed by its name, or by every address of its name."""
     return _named(host, allowed) or _in_a_network(addresses, allowed)
 
 
 def permitted_addresses(host: str, addresses: Sequence[str], allowed: Sequence[str]) -> list[str]:
-    """Return the addresses of a host, in their order, that a connection may be made to."""
+    """Return the addresses of a host that a connection may use, in their order."""
     return [address for address in addresses if is_permitted(host, [address], allowed)]
 
 
@@ -46,6 +46,6 @@ def _networks(allowed: Sequence[str]) -> list[ipaddress.IPv4Network | ipaddress.
 
 
 def _plain(address: str) -> IpAddress | None:
-    """An IPv4 address in its IPv6 form is the IPv4 address."""
+    """Return an address, IPv4 if it is an IPv4-mapped IPv6 address; None for a name."""
     ip = ip_of(address)
     return (ip.ipv4_mapped or ip) if isinstance(ip, ipaddress.IPv6Address) else ip

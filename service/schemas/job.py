@@ -1,4 +1,4 @@
-"""A job: its state, how far it is, and what is told of its end."""
+"""Models of a job: state, progress, result, and the event of its end."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from service.schemas.results import AnyResult
 
 
 class Progress(Schema):
-    """How far a running job has come: `fraction` 0..1 of the whole."""
+    """Progress of a running job; `fraction`: 0..1 of the whole job."""
 
     stage: Annotated[Literal["segmentation", "evolution", "refinement", "preview", "detection", "fit"], OPEN_WORD]
     fraction: float = Field(ge=0, le=1)
@@ -23,12 +23,12 @@ class Progress(Schema):
     expected_end: datetime | None = Field(
         None,
         exclude_if=is_none,
-        description="Of a search for cameras: when it will end, estimated anew with each camera; else not there.",
+        description="Estimated end of a search for cameras, updated with each camera; absent for other jobs.",
     )
 
 
 class JobError(Schema):
-    """Why a job failed: the members of a problem (RFC 9457)."""
+    """Reason of a failed job, with the members of a problem (RFC 9457)."""
 
     type: str
     title: str
@@ -37,22 +37,22 @@ class JobError(Schema):
 
 
 class CallbackState(Schema):
-    """How far the telling of a job's end has come, once it has ended; `callback_url` in the options asked for it."""
+    """Delivery of the callback of an ended job to the `callback_url` of its options."""
 
     state: Annotated[Literal["waiting", "delivered", "given-up"], OPEN_WORD]
-    attempts: int = Field(description="Begun so far.")
-    last_error: str | None = Field(description="Why the last attempt that failed did.")
-    next_attempt_at: datetime | None = Field(description="Null unless waiting.")
+    attempts: int = Field(description="Attempts begun so far.")
+    last_error: str | None = Field(description="Reason of the last failed attempt.")
+    next_attempt_at: datetime | None = Field(description="Time of the next attempt; null unless waiting.")
 
 
 def _or_none_of_a_newer_kind(result: Any, check: ValidatorFunctionWrapHandler, info: ValidationInfo) -> Any:
-    """A result, unless the kind of the job is one that only a newer version knows."""
+    """Return the result, or None for a kind of job that only a newer version knows."""
     newer = is_tolerant(info) and info.data.get("kind") not in get_args(JobKind)
     return None if newer else check(result)
 
 
 class Job(Schema):
-    """What a worker computes: its state, how far it is, and in the end its result, of its kind, or its error."""
+    """A computation of a worker: its state, its progress, and in the end its result or its error."""
 
     model_config = ConfigDict(
         json_schema_extra={
@@ -84,62 +84,62 @@ class Job(Schema):
     id: str
     kind: Annotated[JobKind, OPEN_WORD] = "calibration"
     venue: str | None = Field(
-        description="Null for the intrinsics of a lens, which belong to no venue. That of a search for cameras need "
-        "not be stored yet."
+        description="Id of the venue; null for the intrinsics of a lens. For a search for cameras, the venue need not "
+        "be stored yet."
     )
     status: Annotated[JobStatus, OPEN_WORD]
     progress: Progress | None
-    queue_position: int | None = Field(description="1 = next; null unless queued.")
-    attempt: int = Field(description="How often the job was begun; above 1 after a crash of its worker.")
+    queue_position: int | None = Field(description="Position in the queue, 1 = next; null unless queued.")
+    attempt: int = Field(description="Number of starts of the job; above 1 after a crash of its worker.")
     created_at: datetime
     started_at: datetime | None
     finished_at: datetime | None
     error: JobError | None
     result: Annotated[AnyResult | None, WrapValidator(_or_none_of_a_newer_kind)]
     callback: CallbackState | None = Field(
-        None, description="Null before the end, without `callback_url`, and in what a `callback_url` gets."
+        None, description="Delivery of the callback; null before the end, without `callback_url`, and in callbacks."
     )
     venue_revision: int | None = Field(
-        None, description="The revision of the venue that its poses became, by themselves or by hand; null: none."
+        None, description="Revision of the venue that its poses became, automatically or by hand; null: none."
     )
     asked_by: str | None = Field(
         None,
-        description="`key NAME`: with this API key; `schedule`: that of the venue; `another key`: to a key for some "
-        "venues, any but itself; null: no key was asked for.",
+        description="Submitter. `key NAME`: this API key; `schedule`: the venue's schedule; `another key`: shown to a "
+        "key that is limited to some venues, for any key but itself; null: the service asked for no key.",
     )
     options: dict[str, Any] = Field(
-        {}, description="As they were asked, what was left out filled in, the seed too; without `callback_url`."
+        {}, description="Options of the job with all defaults and the seed filled in, without `callback_url`."
     )
     frames: dict[str, list[str]] = Field(
-        {}, description="Addresses of the frames as they came, by camera or the name of a photo; empty: none are kept."
+        {}, description="Addresses of the frames as uploaded, by camera or photo name; empty: no longer kept."
     )
-    links: dict[str, str] = Field(description="Addresses, relative to that of the service.")
+    links: dict[str, str] = Field(description="Related addresses, relative to the service's.")
 
     @property
     def open(self) -> bool:
-        """Whether anything can still change."""
+        """True while the job is queued or running."""
         return self.status in OPEN_STATUSES
 
 
 class JobEvent(Attributed):
-    """A job has ended: what a `callback_url` gets, at least once; its id is the `webhook-id` of every attempt.
+    """Event of an ended job, sent to its `callback_url` at least once; the `webhook-id` of every attempt is the same.
 
-    Who follows the venue is also told when a job was submitted (`job.queued`).
+    Webhooks and event streams of the venue also get `job.queued`, when a job is submitted.
     """
 
     type: Literal["job.queued", "job.succeeded", "job.failed", "job.cancelled"]
-    timestamp: datetime = Field(description="When it happened.")
-    data: Job = Field(description="As it ended; of `job.queued`: as it was when it was submitted.")
+    timestamp: datetime = Field(description="Time of the event.")
+    data: Job = Field(description="The job at its end; for `job.queued`, at its submission.")
 
     @classmethod
     def of(cls, job: Job) -> JobEvent:
-        """The event of an ended job."""
-        told = job.model_copy(update={"callback": None})
-        return cls.model_validate({"type": f"job.{job.status}", "timestamp": job.finished_at, "data": told})
+        """Return the event of an ended job."""
+        data = job.model_copy(update={"callback": None})
+        return cls.model_validate({"type": f"job.{job.status}", "timestamp": job.finished_at, "data": data})
 
 
 class JobSummary(Schema):
-    """A job in a line: how it ended or how far it is, without its result."""
+    """Summary of a job: state and progress, without its result."""
 
     id: str
     kind: Annotated[JobKind, OPEN_WORD]
@@ -151,8 +151,8 @@ class JobSummary(Schema):
     started_at: datetime | None
     finished_at: datetime | None
     error: JobError | None
-    verdict: str | None = Field(description="Of the result of a calibration.")
-    stitch_error_px: float | None = Field(description="Of the result of a calibration.")
+    verdict: str | None = Field(description="Verdict of a calibration's result.")
+    stitch_error_px: float | None = Field(description="Stitch error of a calibration's result.")
     asked_by: str | None
 
 
@@ -161,7 +161,7 @@ class Jobs(Schema):
 
     jobs: list[Job]
     summaries: list[JobSummary] | None = Field(
-        None, exclude_if=is_none, description="With `fields=summary`, where `jobs` is empty; not there otherwise."
+        None, exclude_if=is_none, description="Only with `fields=summary`, and then instead of `jobs`."
     )
     unreadable: list[Unreadable] = Field([], exclude_if=is_empty, description=UNREADABLE)
     next_cursor: str | None = None

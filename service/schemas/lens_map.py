@@ -1,10 +1,10 @@
-"""What a lens does over its picture: where it has rays, and what its numbers make doubtful. Arrays, no models.
+"""Plausibility of a lens over its picture: where pixels have a ray, and suspicious parameters. Arrays, no models.
 
     warnings = lens_warnings(camera)
 
 A lens is judged by its effect and not by the size of a coefficient: the sixth-order term of a long lens is in the
-thousands and shifts a corner by a pixel, and a rational one has large numbers that cancel. A few thousand rays, along
-spokes around the axis, are taken through the lens; along each spoke its map holds until it stands still or turns back.
+thousands and shifts a corner by a pixel, and rational lenses have large coefficients that cancel. A few thousand rays,
+along spokes around the axis, are distorted; along each spoke the map is valid until it stands still or turns back.
 """
 
 from __future__ import annotations
@@ -25,21 +25,20 @@ Array = NDArray[np.float64]
 WIDEST_OPENCV, WIDEST_FISHEYE = 20.0, math.tan(math.radians(89.0))
 """Undistorted radius (at depth 1) up to which the engine uses a lens of each model."""
 SPOKES, STEPS, FARTHER_STEPS = 64, 200, 100
-"""Directions, and rays along each within twice the picture's own radius and farther out: steps of 1 and some 4 %."""
+"""Spokes, and rays along each: within twice the picture's radius (steps of 1 %), and farther out (steps of 4 %)."""
 GRID = 64
-"""Pixels to each side that are asked whether a ray ends there: shares are good to a per cent."""
+"""Pixels per side that are tested for a ray: shares are good to a per cent."""
 LEAST_SHARE = 0.1
-"""Of the picture, with rays: of less no camera can be calibrated, and the numbers are likely in the wrong order."""
+"""Least share of the picture with rays: with less no camera can be calibrated, and coefficients are likely swapped."""
 LEAST_BLIND_SHARE = 0.005
-"""Of the picture, without rays, that is worth a word: less is the very corner, which no line needs."""
+"""Least share of the picture without rays that is warned about: less is the very corner, which no line needs."""
 LEAST_DENOMINATOR = 0.05
-"""Of a rational lens, where it is 1 on the axis. Below it the lens is the ratio of two small differences of large
-numbers, and a change in the third place of a coefficient, which no board determines, shifts the picture."""
+"""Least denominator of a rational lens, which is 1 on the axis. Below it the lens is the ratio of two small differences
+of large numbers: a change in the third place of a coefficient, which no board determines, shifts the picture."""
 LARGEST_STRETCH = 1.5
-"""Of the way from the axis to a place of the picture, beside a lens without distortion: zooms stretch by some per cent,
-and wide lenses squeeze."""
+"""Largest ratio of distorted to undistorted radius: zooms stretch by some per cent, and wide lenses squeeze."""
 SQUARE_WITHIN = 0.02
-"""By which fx and fy may differ: pixels of cameras are square, and a good board finds that to some thousandths."""
+"""Relative difference of fx and fy: pixels of cameras are square, and a good board finds that to some thousandths."""
 OTHER_SIZES = {
     2: "half",
     3: "a third",
@@ -49,25 +48,24 @@ OTHER_SIZES = {
     1 / 3: "three times",
     0.25: "four times",
 }
-"""By which the picture is larger than another one of the same camera (2160, 1440, 1080, 720, 540 lines), and how large
-the other one is beside it."""
+"""Words for another resolution of a camera (2160, 1440, 1080, 720, 540 lines), by the ratio of this one to it."""
 CENTRED = 0.1
-"""How far from the middle a principal point lies at most, in parts of the side of the picture that it belongs to."""
+"""Largest distance of a principal point from the middle, as a part of the picture's side."""
 
 
 ASIDE = {2, 3, *range(8, 14)}
-"""Places of the coefficients of the model `opencv` that are not radial: p1, p2, s1 to s4, tau_x and tau_y."""
+"""Indices of the coefficients of the model `opencv` that are not radial: p1, p2, s1 to s4, tau_x and tau_y."""
 _TURNS = np.linspace(0.0, 2 * math.pi, SPOKES, endpoint=False)
 DIRECTIONS = np.stack([np.cos(_TURNS), np.sin(_TURNS)])
 
 
 @dataclass(frozen=True)
 class LensMap:
-    """Where a lens has rays.
+    """The part of a picture that a lens has rays for, and how far it distorts there.
 
-    `blind_share`: the part (0..1) of the picture where no ray ends; `radius_px`: how far from the principal point the
-    nearest such pixel lies, inf without one. Of the rays of the picture, `least_denominator` is that of a rational
-    lens, and `stretch` how many times as far from the axis as without distortion the farthest of them ends.
+    `blind_share`: share 0..1 of the picture without a ray; `radius_px`: distance of the nearest such pixel from the
+    principal point, inf if there is none; `least_denominator`: least denominator of a rational lens; `stretch`: largest
+    ratio of distorted to undistorted radius.
     """
 
     blind_share: float
@@ -77,19 +75,19 @@ class LensMap:
 
     @property
     def is_usable(self) -> bool:
-        """True where enough of the picture has rays."""
+        """True if enough of the picture has rays."""
         return 1 - self.blind_share >= LEAST_SHARE
 
     @property
     def is_usual(self) -> bool:
-        """True of what a real lens may do."""
+        """True if the lens distorts no more than real lenses do."""
         return self.is_usable and self.stretch <= LARGEST_STRETCH
 
 
 def lens_warnings(camera: Any) -> list[str]:
-    """Return what is doubtful about the lens of a camera, a line each.
+    """Return warnings about the lens of a camera, a line each.
 
-    `camera`: a model of the wire, or the record of a job that is a part of one.
+    `camera`: a model of the interface, or a camera of a job's input.
     """
     lens = camera.intrinsics
     doubts = [f"camera {camera.id}: {words}" for words in lens_doubts(lens, camera.image_size)]
@@ -97,7 +95,7 @@ def lens_warnings(camera: Any) -> list[str]:
 
 
 def lens_doubts(lens: Any, image_size: Sequence[int]) -> list[str]:
-    """Return what the numbers of a lens make doubtful in a picture of `image_size`, in words."""
+    """Return doubts about the parameters of a lens for a picture of `image_size`, in words."""
     width, height = image_size
     seen = map_of(lens.model, lens.matrix, lens.distortion, image_size)
     return [*_map_doubts(seen), *_matrix_doubts(lens.matrix, width, height)]
@@ -117,11 +115,11 @@ def require_usable_lens(lens: Any, image_size: Sequence[int]) -> None:
 def map_of(
     model: LensModel, matrix: Sequence[Sequence[float]], distortion: Sequence[float], image_size: Sequence[int]
 ) -> LensMap:
-    """Return where a lens has rays, in a picture of `image_size` (width, height)."""
+    """Return the map of a lens over a picture of `image_size` (width, height)."""
     return _map_of(model, tuple(map(tuple, matrix)), tuple(distortion), tuple(image_size))
 
 
-# A venue that is put is checked, and then warned about.
+# A PUT checks each lens, and then asks for warnings about it.
 @lru_cache(maxsize=256)
 def _map_of(
     model: LensModel, matrix: tuple[tuple[float, ...], ...], distortion: tuple[float, ...], size: tuple[int, ...]
@@ -129,7 +127,7 @@ def _map_of(
     (fx, skew, cx), (_, fy, cy), _ = matrix
     middles = [(np.arange(GRID) + 0.5) / GRID * side - 0.5 for side in size]
     columns, rows = np.meshgrid(*middles)
-    # Numbers of any size may come. What they make of a ray is then no number, and counts as no ray.
+    # Parameters may have any size. A ray that they turn into NaN or infinity counts as none.
     with np.errstate(all="ignore"):
         y = (rows - cy) / fy
         x = (columns - cx - skew * y) / fx
@@ -192,7 +190,7 @@ def _matrix_doubts(matrix: Sequence[Sequence[float]], width: int, height: int) -
 
 
 def _times_larger(across: float, down: float) -> float | None:
-    """Return how many times larger the picture is than the one in whose middle the principal point lies, or None.
+    """Return the ratio of the picture to the resolution whose middle the principal point is; None if it is this one.
 
     `across` and `down`: the principal point in parts of the sides.
     """
@@ -202,14 +200,14 @@ def _times_larger(across: float, down: float) -> float | None:
 
 
 def _radii(corner: float, widest: float) -> Array:
-    """Return undistorted radii from 0 to `widest`, finely as far as a lens that hardly distorts has its picture."""
+    """Return undistorted radii from 0 to `widest`, finely up to twice the `corner` of the picture."""
     if not 2 * corner < widest:
         return np.linspace(0.0, widest, STEPS + FARTHER_STEPS)
     return np.concatenate([np.linspace(0.0, 2 * corner, STEPS)[:-1], np.geomspace(2 * corner, widest, FARTHER_STEPS)])
 
 
 def _spokes(model: LensModel, distortion: Sequence[float], radii: Array) -> Array:
-    """Return the distorted coordinates (2, radii, spokes) of rays along spokes, of a camera matrix of 1."""
+    """Return the distorted coordinates (2, radii, spokes) of rays along spokes, for an identity camera matrix."""
     x, y = DIRECTIONS[:, None] * radii[:, None]
     return np.stack((_through_fisheye if model == "fisheye" else _through_opencv)(distortion, x, y))
 
@@ -240,7 +238,7 @@ def _through_opencv(distortion: Sequence[float], x: Array, y: Array) -> tuple[Ar
 
 
 def _radial(model: LensModel, distortion: Sequence[float], radii: Array) -> Array:
-    """Return the distorted radii by the radial terms alone."""
+    """Return the radii as the radial terms alone distort them."""
     if model == "fisheye":
         return _through_fisheye(distortion, radii, np.zeros_like(radii))[0]
     radial = [0.0 if number in ASIDE else value for number, value in enumerate(distortion)]
@@ -248,26 +246,26 @@ def _radial(model: LensModel, distortion: Sequence[float], radii: Array) -> Arra
 
 
 def _last_of_each(model: LensModel, distortion: Sequence[float], radii: Array, ends: Array) -> NDArray[np.intp]:
-    """Return the number of the last ray of each spoke (spokes,) up to which the map neither turns nor stands still."""
+    """Return the index of the last ray of each spoke (spokes,) before the map stands still or turns back."""
     outwards = np.diff(ends, axis=1)
     around = (np.roll(ends, -1, axis=2) - np.roll(ends, 1, axis=2))[:, 1:]
     holds = (outwards[0] * around[1] - outwards[1] * around[0] > 0) & np.isfinite(ends[:, 1:]).all(axis=0)
     # The engine uses no ray beyond where the radial terms alone turn back.
     holds &= (np.diff(_radial(model, distortion, radii)) > 0)[:, None]
-    # What is turned by half a turn beyond the axis looks like a map as well.
+    # A map that is turned by half a turn behind the axis would pass the test above.
     holds &= (ends[:, 1:] * DIRECTIONS[:, None]).sum(axis=0) > 0
     return np.where(holds.all(axis=0), len(holds), np.argmin(holds, axis=0))
 
 
 def _rim(ends: Array, number: NDArray[np.intp], directions: Array) -> Array:
-    """Return how far from the axis the map reaches in `directions` (...), where each spoke has so many rays."""
+    """Return the distorted radius that the map reaches in `directions` (...); `number`: last valid ray by spoke."""
     x, y = ends[:, number, np.arange(SPOKES)]
     angles, distances = np.arctan2(y, x), np.hypot(x, y)
     return np.asarray(np.interp(directions, angles, distances, period=2 * math.pi))
 
 
 def _least_denominator(model: LensModel, distortion: Sequence[float], radius: float) -> float:
-    """Return the least denominator of a rational lens up to an undistorted radius; 1 of other lenses."""
+    """Return the least denominator of a rational lens up to an undistorted radius; 1 for other lenses."""
     if model == "fisheye" or len(distortion) < 8:
         return 1.0
     k4, k5, k6 = distortion[5:8]

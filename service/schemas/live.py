@@ -1,4 +1,4 @@
-"""Live poses as the service knows them: what `esc live` reports, the newest report, and what happened by the minute."""
+"""Models of live poses: the reports of `esc live`, the newest state, and the history by minute."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def _as_written(moment: Any) -> Any:
     return moment
 
 
-# Not a number of seconds as well, which Pydantic would take for a moment.
+# Pydantic alone would also take a number of seconds for a moment.
 Timestamp = Annotated[AwareDatetime, BeforeValidator(_as_written)]
 Count = Annotated[Integer, Field(ge=0, le=10**9)]
 Milliseconds = Annotated[Number, Field(ge=0, le=1e9)]
@@ -41,7 +41,7 @@ StreamAddress = Annotated[Name, StringConstraints(min_length=1, max_length=1024)
 
 
 class LatencyMs(Schema):
-    """From the arrival of a picture until its pose was sent, in milliseconds: the median and the 99th percentile."""
+    """Latency from the arrival of a picture to the sending of its pose, ms: median and 99th percentile."""
 
     p50: Milliseconds
     p99: Milliseconds
@@ -55,34 +55,36 @@ class LiveSigma(Schema):
 
 
 class _LiveCamera(Schema):
-    """A camera whose poses are sent, but for its pose. Counts are of the pictures since the last report."""
+    """A camera whose poses are sent, without its pose. Counts are of pictures since the last report."""
 
     id: Id
     status: Annotated[LiveStatus, OPEN_WORD] = Field(
-        description="`stored`: no stream is given, the stored pose is sent. `measured`: its lines were measured within "
-        "the last two seconds. `coasted`: they were not looked for or not seen, the filter carries on. `refused`: they "
-        "contradicted all that was known. `silent`: no pose came of its stream for a second, the stored one is sent."
+        description="`stored`: the camera has no stream, its stored pose is sent. `measured`: its lines were measured "
+        "within the last two seconds. `coasted`: lines were not looked for or not seen, the filter predicts the pose. "
+        "`refused`: lines contradicted the prediction. `silent`: its stream gave no pose for a second, the stored "
+        "pose is sent."
     )
     stream: StreamAddress | None = Field(
-        None, description="The address that it is tracked in, without a login; null: none is given."
+        None, description="Address of the stream that it is tracked in, without user and password; null: none."
     )
-    sigma: LiveSigma | None = Field(None, description="Of a pose that was tracked.")
+    sigma: LiveSigma | None = Field(None, description="Uncertainty of a tracked pose.")
     turned_deg: Annotated[Number, Field(ge=0, le=180)] | None = Field(
-        None, description="By how much it is turned from its stored pose."
+        None, description="Rotation from its stored pose, degrees."
     )
     moved_m: Annotated[Number, Field(ge=0, le=4000)] | None = Field(
-        None, description="How far it is from its stored pose."
+        None, description="Distance from its stored position, m."
     )
-    taken_at: Timestamp | None = Field(None, description="When the picture of this pose was taken, by `clock`.")
+    taken_at: Timestamp | None = Field(None, description="Time at which the picture of this pose was taken.")
     clock: Annotated[LiveClock, OPEN_WORD] | None = Field(
-        None, description="`rtcp`: by the camera's own clock; `arrival`: when the picture arrived; null: no picture."
+        None,
+        description="Clock of `taken_at`: `rtcp`, the camera's own, or `arrival` of the picture; null: no picture.",
     )
-    pictures: Count = Field(0, description="That arrived: those left out, measured, coasted and refused.")
-    left_out: Count = Field(0, description="Not looked at, because a newer one waited.")
-    measured: Count = 0
-    coasted: Count = 0
-    refused: Count = 0
-    latency_ms: LatencyMs | None = Field(None, description="Over the last ten seconds; null: no picture came.")
+    pictures: Count = Field(0, description="Pictures that arrived: `left_out`, `measured`, `coasted` and `refused`.")
+    left_out: Count = Field(0, description="Pictures that were skipped because a newer one had arrived.")
+    measured: Count = Field(0, description="Pictures in which lines were measured.")
+    coasted: Count = Field(0, description="Pictures whose pose was predicted.")
+    refused: Count = Field(0, description="Pictures whose lines contradicted the prediction.")
+    latency_ms: LatencyMs | None = Field(None, description="Latency over the last ten seconds; null: no picture.")
 
     @model_validator(mode="after")
     def _adds_up(self) -> Self:
@@ -92,19 +94,19 @@ class _LiveCamera(Schema):
 
 
 class LiveCameraIn(_LiveCamera):
-    """A camera in a report as it is sent."""
+    """A camera in a report of `esc live`."""
 
-    pose: PoseIn | None = Field(None, description="That was sent last.")
+    pose: PoseIn | None = Field(None, description="The pose that was sent last.")
 
 
 class LiveCamera(_LiveCamera):
-    """A camera in the newest report."""
+    """A camera in the newest report, as the service answers it."""
 
-    pose: Pose | None = Field(None, description="That was sent last.")
+    pose: Pose | None = Field(None, description="The pose that was sent last.")
 
     @classmethod
     def from_input(cls, camera: LiveCameraIn) -> LiveCamera:
-        """From a camera as it was sent."""
+        """Return the camera of a report with its pose in both conventions."""
         pose = None if camera.pose is None else Pose.from_input(camera.pose)
         return cls(**dict(camera) | {"pose": pose})
 
@@ -133,17 +135,19 @@ CAMERA_EXAMPLE: dict[str, Any] = {
 
 
 class LiveReport(Schema):
-    """A report of a process that sends live poses, made twice a second."""
+    """Report of a process that sends live poses, twice a second."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [PROCESS_EXAMPLE | {"cameras": [CAMERA_EXAMPLE]}]})
 
     started_at: Timestamp
-    host: Annotated[Name, StringConstraints(min_length=1, max_length=255)] = Field(description="Where it runs.")
+    host: Annotated[Name, StringConstraints(min_length=1, max_length=255)] = Field(
+        description="Host that the process runs on."
+    )
     pid: Annotated[Integer, Field(ge=0, le=2**31 - 1)] | None = None
     destinations: Annotated[list[Name], Field(max_length=100)] = Field(
-        description="Where it sends poses, in words such as `opentrackio multicast`."
+        description="Destinations of the poses, in words such as `opentrackio multicast`."
     )
-    stopped: Flag = Field(False, description="It ends because it was told to: nobody is to miss it.")
+    stopped: Flag = Field(False, description="The last report of a process that was stopped on purpose: no alarm.")
     cameras: Annotated[list[LiveCameraIn], Field(max_length=32)]
 
     @model_validator(mode="after")
@@ -155,33 +159,35 @@ class LiveReport(Schema):
 
 
 class LiveSender(Schema):
-    """A process that sends a venue's live poses beside the one that reported last."""
+    """Another process that sends a venue's live poses, besides the one that reported last."""
 
     host: str
     pid: int | None = None
     started_at: datetime
-    reported_at: datetime = Field(description="When the service got its last report.")
-    running: bool = Field(description="Whether that is at most five seconds ago.")
+    reported_at: datetime = Field(description="Time of its last report.")
+    running: bool = Field(description="True if that is at most five seconds ago.")
 
 
 class LiveState(Schema):
     """The newest report of the process that sends a venue's live poses; without one, all but `cameras` is null."""
 
-    reported_at: datetime | None = Field(None, description="When the service got it.")
-    running: bool = Field(False, description="Whether that is at most five seconds ago, and the process was not ended.")
+    reported_at: datetime | None = Field(None, description="Time of the report.")
+    running: bool = Field(
+        False, description="True if that is at most five seconds ago and the process was not stopped."
+    )
     started_at: datetime | None = None
     host: str | None = None
     pid: int | None = None
     destinations: list[str] = Field([])
-    stopped: bool = Field(False, description="Whether the process was told to end.")
+    stopped: bool = Field(False, description="True if the process was stopped on purpose.")
     cameras: list[LiveCamera] = Field([])
     others: list[LiveSender] = Field(
-        [], description="Other processes that report of the venue, or did so until they were missed: run one."
+        [], description="Other processes that report about the venue, or were running until they fell silent: run one."
     )
 
 
 class LiveMinuteCamera(Schema):
-    """A camera in a minute: pictures by what became of them, and the worst that its reports said of it."""
+    """A camera in a minute: counts of its pictures, and the worst turn and latency of its reports."""
 
     pictures: int = 0
     measured: int = 0
@@ -191,7 +197,7 @@ class LiveMinuteCamera(Schema):
     latency_ms: LatencyMs | None = Field(None, description="The worst of the minute's reports.")
 
     def with_report(self, camera: LiveCameraIn) -> LiveMinuteCamera:
-        """Return the minute with one more report counted in."""
+        """Return the minute with one more report added."""
         turns = [turn for turn in (self.turned_deg, camera.turned_deg) if turn is not None]
         latencies = [latency for latency in (self.latency_ms, camera.latency_ms) if latency is not None]
         worst = {name: max(getattr(latency, name) for latency in latencies) for name in ("p50", "p99") if latencies}
@@ -206,14 +212,14 @@ class LiveMinuteCamera(Schema):
 
 
 class LiveMinute(Schema):
-    """A minute in which a process reported."""
+    """A minute of live poses."""
 
-    at: datetime = Field(description="When the minute began.")
+    at: datetime = Field(description="Beginning of the minute.")
     cameras: dict[Id, LiveMinuteCamera]
 
 
 class LiveHistory(Schema):
-    """Minutes of a venue's live poses, oldest first; those without a report are left out."""
+    """Minutes of a venue's live poses, oldest first; minutes without a report are left out."""
 
     venue: Id
     minutes: list[LiveMinute]

@@ -1,4 +1,4 @@
-"""JSON merge patches (RFC 7396): what is given replaces, null takes away, all else stays.
+"""JSON merge patches (RFC 7396): a value replaces, null removes, everything else stays.
 
 One addition: a list of things that have ids may be patched by an object of those ids. By the RFC alone a camera's
 source could only be changed by sending all cameras, with the poses that they happened to have when they were read.
@@ -9,12 +9,12 @@ from __future__ import annotations
 from typing import Any
 
 MEDIA_TYPE = "application/merge-patch+json"
-# Deeper than any document of this interface: what lies below is no part of one, and is left as it came.
+# Deeper than any document of this interface: below, the patch replaces the target as a whole.
 DEEPEST = 16
 
 
 def apply_merge_patch(target: Any, patch: Any, depth: int = 0) -> Any:
-    """A document after a patch; both stay as they are."""
+    """Return a document with a patch applied; neither is modified."""
     if not isinstance(patch, dict) or depth > DEEPEST:
         return patch
     if isinstance(target, list) and all(isinstance(one, dict) and "id" in one for one in target):

@@ -1,4 +1,4 @@
-"""What a caller may choose: of a calibration, and of what comes before the first one."""
+"""Options of jobs: calibrations, lenses from photos, first poses, field fits and searches for cameras."""
 
 from __future__ import annotations
 
@@ -15,39 +15,47 @@ CHARUCO_PATTERN = r"^((4X4|5X5|6X6|7X7)_(50|100|250|1000)|ARUCO_ORIGINAL|APRILTA
 
 
 class Handling(Schema):
-    """How a job is to be treated, whatever it computes."""
+    """Options of every kind of job."""
 
     priority: Annotated[Literal["live", "routine"], OPEN_WORD] = "routine"
-    timeout_s: Annotated[Number, Field(ge=1, le=3600)] | None = Field(None, description="Absent: the service's.")
-    callback_url: CallbackUrl | None = Field(None, description="Told of the job's end, signed (Standard Webhooks).")
+    timeout_s: Annotated[Number, Field(ge=1, le=3600)] | None = Field(
+        None, description="Time limit; absent: the service's default."
+    )
+    callback_url: CallbackUrl | None = Field(
+        None, description="Gets a signed POST (Standard Webhooks) when the job has ended."
+    )
 
 
 class Options(Handling):
-    """What a caller may choose; everything is optional."""
+    """Options of a calibration; everything is optional."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [{"preset": "esc", "seed": 7, "dry_run": True}]})
 
     preset: Annotated[Literal["esc", "paper", "scpr"], OPEN_WORD] = "esc"
     search: Annotated[Literal["auto", "wide", "anywhere"], OPEN_WORD] = Field(
         "auto",
-        description="`auto`: no search where the cameras stand almost as stored, else one around the stored poses; "
-        "last, for a camera whose lines are clearly seen but not where its pose expects them, one where "
-        "it stood, turned by any angle. `wide`: around the stored poses in any case, and nowhere else. "
-        "`anywhere`: for every camera, first where it stood and then elsewhere too.",
+        description="`auto`: no search if the cameras stand almost as stored, else a search around the stored poses, "
+        "and last, for a camera whose lines are clearly visible but not where its pose expects them, a search at its "
+        "stored position in any direction. `wide`: always around the stored poses, and nowhere else. `anywhere`: for "
+        "every camera, first at its stored position and then elsewhere.",
     )
     seed: Annotated[Integer, Field(ge=0, le=2**53 - 1)] | None = Field(None, description="Absent: one is chosen.")
-    generations: Annotated[Integer, Field(ge=1, le=2000)] = Field(100, description="G of the paper.")
-    parents: Annotated[Integer, Field(ge=2, le=4096)] = Field(64, description="μ of the paper.")
-    offspring: Annotated[Integer, Field(ge=2, le=8192)] = Field(128, description="λ of the paper's strategy.")
-    stitch_weight: Annotated[Number, Field(ge=0, le=1)] = Field(0.5, description="The paper's trade-off λ.")
-    flat: Flag = Field(False, description="Calibrate on a plane although the venue has a ridge.")
-    fit_focal_length: Flag = Field(False, description="Find each camera's focal length too: heat changes it.")
-    fit_ridge: Flag = Field(False, description="Find the height of the field's ridge too.")
-    dry_run: Flag = Field(False, description="Never move the stored poses.")
+    generations: Annotated[Integer, Field(ge=1, le=2000)] = Field(
+        100, description="Generations of the search (G of the paper)."
+    )
+    parents: Annotated[Integer, Field(ge=2, le=4096)] = Field(64, description="Parents of a generation (μ).")
+    offspring: Annotated[Integer, Field(ge=2, le=8192)] = Field(128, description="Offspring of a generation (λ).")
+    stitch_weight: Annotated[Number, Field(ge=0, le=1)] = Field(
+        0.5, description="Weight of the stitch error in the loss (the paper's trade-off λ)."
+    )
+    flat: Flag = Field(False, description="Calibrate on a plane even if the venue has a ridge.")
+    fit_focal_length: Flag = Field(False, description="Also fit each camera's focal length: heat changes it.")
+    fit_ridge: Flag = Field(False, description="Also fit the height of the field's ridge.")
+    dry_run: Flag = Field(False, description="Never change the stored poses.")
     pictures: Flag = Field(
         False,
-        description="Draw all pictures with the job. Absent: where all poses are accepted, each is drawn when it is "
-        "first looked at.",
+        description="Draw all pictures with the job. Otherwise, if all poses are accepted, each is drawn on its first "
+        "request.",
     )
 
     @model_validator(mode="after")
@@ -60,10 +68,10 @@ class Options(Handling):
 
 
 class Charuco(Schema):
-    """What a ChArUco board has beside its squares."""
+    """Markers of a ChArUco board."""
 
     dictionary: Annotated[str, StringConstraints(pattern=CHARUCO_PATTERN)] = Field(
-        description="OpenCV's name without DICT_, for instance 4X4_50."
+        description="OpenCV's name of the dictionary without DICT_, for instance 4X4_50."
     )
     marker_m: Annotated[Number, Field(gt=0, le=10)] = Field(description="Side of a marker, m.")
 
@@ -84,7 +92,7 @@ class Board(Schema):
 
 
 class IntrinsicsOptions(Handling):
-    """What photos show, and which lens to look for."""
+    """Options of a lens calibration from photos: the board, and the lens model."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [{"board": {"columns": 9, "rows": 6, "square_m": 0.03}}]})
 
@@ -97,7 +105,7 @@ Landmark = Annotated[str, StringConstraints(min_length=1, max_length=200)]
 
 
 class ClickedPoint(Schema):
-    """A point of the pitch in a camera's picture: its name or [x, y] or [x, y, z] in metres, and its pixel."""
+    """A clicked point of the pitch: its name or [x, y] or [x, y, z] in metres, and its pixel."""
 
     world: Landmark | Coordinates
     pixel: Annotated[list[Number], Field(min_length=2, max_length=2)]
@@ -108,7 +116,7 @@ class ClickedPoints(RootModel[dict[Id, Annotated[list[ClickedPoint], Field(min_l
 
 
 class LocateOptions(Handling):
-    """Points of the pitch that somebody clicked in the picture of a camera."""
+    """Options of a first pose: points of the pitch that were clicked in the picture of a camera."""
 
     model_config = ConfigDict(
         json_schema_extra={
@@ -129,7 +137,7 @@ class LocateOptions(Handling):
 
 
 class FieldOptions(Handling):
-    """How the measures of a pitch are to be fitted; everything is optional."""
+    """Options of a fit of the pitch's dimensions; everything is optional."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [{"seed": 7}]})
 
@@ -137,21 +145,21 @@ class FieldOptions(Handling):
 
 
 class FindOptions(Handling):
-    """Which cameras are to be found, and what of them holds still; everything is optional.
+    """Options of a search for cameras; everything is optional.
 
-    `cameras`, `find_lens` and `position_radius_m` are about a venue that is stored; of another one, the part `site`
-    says it of each camera.
+    `cameras`, `find_lens` and `position_radius_m` are for a stored venue; for a new one, the part `site` has them for
+    each camera.
     """
 
     model_config = ConfigDict(json_schema_extra={"examples": [{"cameras": ["left"], "position_radius_m": 2}]})
 
     cameras: Annotated[list[Id], Field(min_length=1, max_length=32)] | None = Field(
         None,
-        description="Those that are looked for. Absent: all that frames were sent of. The others help as they are.",
+        description="Cameras to find; absent: all that have frames. The other cameras help with their stored poses.",
     )
-    find_lens: Flag = Field(False, description="Find the lenses of these cameras too; otherwise the stored ones hold.")
+    find_lens: Flag = Field(False, description="Also find the lenses of these cameras; otherwise the stored ones hold.")
     position_radius_m: Annotated[Number, Field(gt=0, le=1000)] | None = Field(
         None,
-        description="How far at most the cameras stand from where they are stored. Absent: they may stand anywhere.",
+        description="Largest distance of the cameras from their stored positions, m. Absent: they may stand anywhere.",
     )
     seed: Annotated[Integer, Field(ge=0, le=2**53 - 1)] | None = Field(None, description="Absent: one is chosen.")

@@ -1,6 +1,6 @@
-"""Errors as RFC 9457 problem details: a stable `type`, what is wrong, which part of it, and what to do.
+"""Errors as RFC 9457 problem details with stable types, and the reasons for rejecting a camera's pose.
 
-And why the pose of a camera is refused, which is no error: a stable word for each reason, and what to do.
+A rejected pose is no error; each reason has a stable word, an explanation and advice.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ MEDIA_TYPE = "application/problem+json"
 
 @dataclass(frozen=True)
 class ProblemType:
-    """One sort of problem: its HTTP status and its title, the same every time it occurs."""
+    """A type of problem: its HTTP status and its title."""
 
     status: int
     title: str
@@ -128,7 +128,7 @@ REFUSALS_DOCUMENT = "docs/refused.md"
 
 @dataclass(frozen=True)
 class RefusalReason:
-    """One reason: what holds, what a person sees, what helps, and the part of `docs/refused.md` about it."""
+    """A reason for rejecting a pose: title, appearance in pictures, advice, and its section of `docs/refused.md`."""
 
     title: str
     looks_like: str
@@ -240,7 +240,7 @@ REFUSAL_REASONS: dict[str, RefusalReason] = {
 
 
 class Problem(Exception):  # noqa: N818  (the term of RFC 9457)
-    """An answer that is not the one hoped for. `parts` are members of their own: the camera, expected and got."""
+    """Raised to answer with a problem. `parts`: further members of the answer, such as camera, expected and got."""
 
     def __init__(self, kind: str, detail: str, *, headers: Mapping[str, str] | None = None, **parts: Any) -> None:
         super().__init__(detail)
@@ -250,7 +250,7 @@ class Problem(Exception):  # noqa: N818  (the term of RFC 9457)
         self.parts = parts
 
     def members(self) -> dict[str, Any]:
-        """The JSON object."""
+        """Return the members of the JSON object."""
         kind = PROBLEM_TYPES[self.kind]
         return {
             "type": problem_uri(self.kind),
@@ -262,7 +262,7 @@ class Problem(Exception):  # noqa: N818  (the term of RFC 9457)
 
 
 class ProblemDetails(BaseModel):
-    """RFC 9457. Beside these members a problem carries the part that is wrong: camera, expected, got, job, errors."""
+    """A problem (RFC 9457). Further members name the part that is wrong: camera, expected, got, job, errors."""
 
     model_config = ConfigDict(
         extra="allow",

@@ -1,4 +1,4 @@
-"""How a result is refused after all, whatever its gate said: for models of results and for plain ones."""
+"""Rejection of a whole result after the quality gate, for models of results and for plain dictionaries."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from service.schemas.names import Verdict, refusal_uri
 
 
 class CameraRefusal(TypedDict):
-    """Members of the answer about a camera that a refusal of all poses changes."""
+    """Members of a camera's result that a rejection of all poses changes."""
 
     accepted: bool
     rejected_because: str
@@ -16,7 +16,7 @@ class CameraRefusal(TypedDict):
 
 
 class ResultRefusal(TypedDict):
-    """Members of a result, beside its cameras, that a refusal of all poses changes."""
+    """Members of a result, besides its cameras, that a rejection of all poses changes."""
 
     verdict: Verdict
     accepted: bool
@@ -24,7 +24,7 @@ class ResultRefusal(TypedDict):
 
 
 def refuse_camera(rejected_because: str | None, refusal: str | None, because: str, reason: str) -> CameraRefusal:
-    """Refuse a camera for one of `REFUSAL_REASONS`, unless it is refused already: `rejected_because`, `refusal`."""
+    """Reject a camera for one of `REFUSAL_REASONS`; a camera that is rejected already keeps its own reason."""
     return {
         "accepted": False,
         "rejected_because": rejected_because or because,
@@ -33,7 +33,7 @@ def refuse_camera(rejected_because: str | None, refusal: str | None, because: st
 
 
 def refuse_result(rejected_because: str | None, because: str) -> ResultRefusal:
-    """Refuse a result, beside the reasons that it has already."""
+    """Reject a result, adding a reason to those that it has."""
     reasons = [because] if rejected_because is None else [rejected_because, because]
     return {
         "verdict": "rejected",

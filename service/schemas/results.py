@@ -1,4 +1,4 @@
-"""What each kind of job finds, and what it is worth."""
+"""Results of each kind of job, with their uncertainties and verdicts."""
 
 from __future__ import annotations
 
@@ -18,9 +18,7 @@ from service.schemas.refusals import refuse_camera, refuse_result
 from service.schemas.trend import Displacement
 
 NO_CHOICE: Mapping[str, int | None] = MappingProxyType({})
-CPU_S: Any = Field(
-    {}, description="Core-seconds, of all threads, of the stages that `timings_s` times; {} of earlier releases."
-)
+CPU_S: Any = Field({}, description="Core-seconds of all threads by stage, as in `timings_s`; {} from earlier releases.")
 
 
 class Sigma(Schema):
@@ -34,17 +32,17 @@ Cause = Literal["dark", "fogged", "blinded", "snow", "out-of-focus", "blocked", 
 
 
 class View(Schema):
-    """Whether a camera's frame could be used, and what is wrong with it if not."""
+    """Usability of a camera's frame, and what is wrong with it."""
 
     usable: bool
     cause: Annotated[Cause, OPEN_WORD] | None = None
-    where: str | None = Field(None, description="Which part of the visible field.")
+    where: str | None = Field(None, description="Affected part of the visible field.")
     detail: str
     lines_found: float | None = Field(
-        None, description="Share 0..1 of the expected places on lines at which a line is seen, before any search."
+        None, description="Share 0..1 of sampled points of the expected lines at which a line is seen, before a search."
     )
     blur_px: float | None = Field(
-        None, description="Of edges, one standard deviation; compared with that of the last accepted job."
+        None, description="Blur of edges, one standard deviation; compared with the last accepted job's."
     )
 
 
@@ -52,54 +50,58 @@ Side = Literal["outside", "inside", "right", "left", "far", "near"]
 
 
 class MarkingResult(Schema):
-    """A marking as one camera sees it; dashes of a line, and marks in rows, are one.
+    """A marking as one camera sees it; the dashes of a line, or marks in a row, count as one.
 
-    Lines that bound the field, and circles and arcs, have an outside and an inside; else the sides are those of the
-    pitch: right (x) and left, far (y) and near.
+    Boundary lines, circles and arcs have an outside and an inside; other markings have the sides of the pitch: right
+    (x) and left, far (y) and near.
     """
 
     name: str
-    expected_m: float = Field(description="Length of it that should be in view.")
+    expected_m: float = Field(description="Length of the marking that should be in view.")
     found: float = Field(description="Share 0..1 of that length that is seen where the pose puts it.")
     offset_cm: float | None = Field(
         None,
-        description="How far its paint lies from where the venue has it, across it on the ground, if all other "
-        "markings are in place; positive outside, right or far, else negative. Null where that cannot be told.",
+        description="Offset of the paint from its place in the venue, across the marking on the ground, if all other "
+        "markings are in place; positive outside, right or far, else negative. Null if it cannot be determined.",
     )
-    sigma_cm: float | None = Field(None, description="One standard deviation of that, ten metres of line taken as one.")
+    sigma_cm: float | None = Field(
+        None, description="One standard deviation of the offset; ten metres of line count as one observation."
+    )
     side: Annotated[Side, OPEN_WORD] | None = Field(
-        None, description="On which side of its place the paint is: the sign in a word."
+        None, description="Side of its place that the paint is on: the sign of the offset in a word."
     )
-    elsewhere: bool = Field(False, description="Beyond three sigma and 3 cm: the paint is off, or a measure.")
+    elsewhere: bool = Field(
+        False, description="True beyond three sigma and 3 cm: the paint or a dimension of the field is wrong."
+    )
 
 
 class Refined(Schema):
-    """A camera's pose and lens as the lines have both, of this night and of those that its memory holds.
+    """Pose and lens of a camera, fitted together to the lines of this night and of those in the camera's memory.
 
-    For whoever measures in the world. The camera's `pose` is the one for the lens that the venue has.
+    Use it to measure in the world. The camera's `pose` belongs to the stored lens instead.
     """
 
     pose: Pose
-    intrinsics: Intrinsics = Field(description="The lens; its `sigma` is the root of the diagonal of `covariance`.")
+    intrinsics: Intrinsics = Field(description="The lens; its `sigma` is the root of `covariance`'s diagonal.")
     covariance: list[list[float]] | None = Field(
         description="12x12: rotation in the camera's frame (rad), position (m), focal length (px), principal point x "
-        "and y (px), aspect (fy/fx), k1, k2. Null where the lines do not determine it."
+        "and y (px), aspect (fy/fx), k1, k2. Null if the lines do not determine it."
     )
-    sigma: Sigma | None = Field(description="Of the pose, with what is not known of the lens.")
+    sigma: Sigma | None = Field(description="Uncertainty of the pose, including the lens's.")
     longer: float = Field(
-        description="How much longer its focal length is than that of the lens of `pose`: 0.001 is 0.1 %."
+        description="Relative difference of its focal length from the lens of the camera's `pose`: 0.001 is 0.1 % more."
     )
     differs_m: float | None = Field(
-        description="How far apart on the ground the same pixels are by `pose` and by the refined one: the median over "
-        "the points in view of the marking that is farthest from the camera, in most views the far touchline. Null "
-        "where no marking is in view."
+        description="Distance on the ground between the positions that the camera's `pose` and the refined pose give "
+        "the same pixels: the median over the visible points of the farthest marking, mostly the far touchline. Null "
+        "if no marking is in view."
     )
 
 
 class LensChange(Schema):
-    """How a camera's focal length has changed since the first nights of its memory.
+    """Change of a camera's focal length since the first nights of its memory.
 
-    It is longer by `longer` ± `sigma` of itself (0.001 is 0.1 %) than on the day of `since`; null: not known.
+    It is longer by the share `longer` ± `sigma` (0.001 is 0.1 %) than at `since`; null: unknown.
     """
 
     longer: float
@@ -112,18 +114,18 @@ class LensChange(Schema):
 
 
 class Proposal(Schema):
-    """Where a camera that was knocked was found again, for a person to accept: `POST /jobs/{id}/accept`."""
+    """New pose of a knocked camera, which a person can accept: `POST /jobs/{id}/accept`."""
 
     pose: Pose
     sigma: Sigma | None
-    moved: Moved = Field(description="From the stored pose.")
-    found: float | None = Field(description="Share 0..1 of the visible markings' length that is seen there.")
+    moved: Moved = Field(description="Movement from the stored pose.")
+    found: float | None = Field(description="Share 0..1 of the visible markings' length that is seen by this pose.")
 
 
 class CrossCheck(Schema):
-    """Pose and lens by every second ten metres of the lines, beside pose and lens by the other ones.
+    """Cross-check of pose and lens: a fit to every second ten metres of the lines against a fit to the others.
 
-    The two put the farthest marking in view `apart_m` apart on the ground. `expected_m`: one standard deviation of
+    The two put the farthest marking in view `apart_m` apart on the ground; `expected_m` is one standard deviation of
     that by the sigmas of both. Several times as much means that sigma is too small for this camera.
     """
 
@@ -132,73 +134,81 @@ class CrossCheck(Schema):
 
 
 class CameraResult(Schema):
-    """One camera's answer."""
+    """Result of a calibration for one camera."""
 
     id: Id
-    accepted: bool = Field(description="Whether the gate lets its pose replace the stored one.")
+    accepted: bool = Field(description="True if the quality gate lets its pose replace the stored one.")
     rejected_because: str | None
     refusal: str | None = Field(
         None,
-        description="Where the service explains that reason: what it looks like and what to do.",
+        description="Path at which the service explains the reason, and what to do.",
         examples=["/refusals/residual"],
     )
     pose: Pose
-    intrinsics: Intrinsics | None = Field(None, description="With fit_focal_length: those the pose belongs to.")
+    intrinsics: Intrinsics | None = Field(None, description="With fit_focal_length: the lens that the pose belongs to.")
     sigma: Sigma | None
     repeatability: Sigma | None = Field(
-        None, description="The part of sigma that the lens and the field, the same the next time, have no part in."
+        None,
+        description="The part of sigma that changes from night to night: without errors of the lens and the field.",
     )
     moved: Moved
-    iou: float | None = Field(description="Of the expected markings and the network's mask of the pitch, as lengths.")
+    iou: float | None = Field(
+        description="Intersection over union of the expected markings and the network's mask, by lengths."
+    )
     seen_by_network: Annotated[Literal["full", "overview"], OPEN_WORD] | None = Field(
         None,
-        description="Whether the network looked at the frame in full, or at an overview, because lines that were "
-        "measured in the frame sufficed; iou, expected_found and unexpected are of what it saw.",
+        description="Input of the network: the frame in `full`, or an `overview` if lines that were measured in the "
+        "frame sufficed. iou, expected_found and unexpected refer to it.",
     )
     expected_found: float | None = Field(
-        None, description="One side of the IoU: share 0..1 of the expected markings that the network's mask covers."
+        None, description="Recall: share 0..1 of the expected markings that the network's mask covers."
     )
     unexpected: float | None = Field(
         None,
-        description="The other side: share 0..1 of the mask on the pitch that lies beside all expected markings; much "
-        "where another sport's lines are painted, which a field may list as `other_markings`.",
+        description="Share 0..1 of the mask on the pitch that lies off all expected markings; large where lines of "
+        "another sport are painted, which a field may list as `other_markings`.",
     )
     found: float | None = Field(
         None, description="Share 0..1 of the visible markings' length that is seen where the pose puts it."
     )
-    by_chance: float | None = Field(None, description="Share 0..1 of that length that would be seen anywhere.")
+    by_chance: float | None = Field(None, description="Share 0..1 of that length that would be seen by chance.")
     residual_px: float | None
     light: Light | None = Field(
-        None, description="How it is evened out with the other accepted cameras in a stitched view; kept with the pose."
+        None,
+        description="Photometric correction for stitched views with the other accepted cameras; kept with the pose.",
     )
     view: View | None = None
     refined: Refined | None = Field(
-        None, description="Pose and lens as the lines have both; null where they are not determined."
+        None, description="Pose and lens fitted together to the lines; null if the lines do not determine both."
     )
-    lens_change: LensChange | None = Field(None, description="Null before its memory has a night.")
+    lens_change: LensChange | None = Field(
+        None, description="Change of the focal length; null before the camera's memory has a night."
+    )
     cross_check: CrossCheck | None = Field(
-        None, description="Half of the lines against the other half; null where one half is too short."
+        None, description="Half of the lines against the other half; null if one half is too short."
     )
     nights: int = Field(
-        0, description="Accepted jobs in the camera's memory, this one too where it is accepted and no dry run."
+        0, description="Accepted jobs in the camera's memory, with this one if it is accepted and no dry run."
     )
-    markings: list[MarkingResult] = Field([], description="What was seen of each marking that should be in view.")
+    markings: list[MarkingResult] = Field(
+        [], description="Each marking that should be in view, and what was seen of it."
+    )
     knocked: bool = Field(
         False,
-        description="Whether it was lost and found again, farther from its stored pose than a camera moves by itself.",
+        description="True if it was lost and found again, farther from its stored pose than a camera moves by itself.",
     )
     proposed: Proposal | None = Field(
-        None, description="Of a knocked camera that is not accepted: the pose that accepting the job stores."
+        None, description="For a knocked camera that is not accepted: the pose that accepting the job stores."
     )
     displacement: Displacement | None = Field(
-        None, description="From the camera's anchor, see `GET /venues/{id}/cameras/{camera}/trend`."
+        None, description="Movement from the camera's anchor, see `GET /venues/{id}/cameras/{camera}/trend`."
     )
 
 
 class SeamPlace(Schema):
     """A piece of line that two cameras see, around a point `at` [x, y] of the pitch, m.
 
-    The second camera puts its paint `error_cm` ± `sigma_cm` beside where the first does, in the direction `across` the
+    The second camera puts its paint `error_cm` ± `sigma_cm` from where the first does, in the direction `across` the
     line, a unit vector [x, y]. Along the line nothing is measured.
     """
 
@@ -209,22 +219,20 @@ class SeamPlace(Schema):
 
 
 class PairResult(Schema):
-    """Two cameras that were compared."""
+    """Agreement of two cameras along their seam."""
 
     cameras: list[Id]
     stitch_error_px: float | None = Field(
-        description="At the centre of the pitch, or of what both see; null where the views cannot be brought together."
+        description="Stitch error at the centre of the pitch, or of the common view; null if the views do not match."
     )
     seam: list[SeamPlace] = Field(
-        description="All along what both see, by the lines that both have measured, from end to end; at most 24 places."
+        description="Places along the common view, on lines that both cameras measured, from end to end; at most 24."
     )
-    worst: SeamPlace | None = Field(
-        description="The place of the seam with the largest error, but for those that are hardly measured."
-    )
+    worst: SeamPlace | None = Field(description="Place with the largest error, without badly measured ones.")
 
 
 class Provenance(Schema):
-    """What it takes to compute the same numbers again."""
+    """Software, network, seed and options: all that is needed to reproduce a result from its frames."""
 
     software: str
     model_sha256: str
@@ -233,9 +241,9 @@ class Provenance(Schema):
 
 
 class Suspicion(Schema):
-    """A number of a camera's lens, or of the field (camera null), that the lines contradict.
+    """A parameter of a camera's lens, or a dimension of the field (`camera` is null), that the lines contradict.
 
-    It seems to be larger than the venue says by `deviation` ± `sigma`, in the unit that `quantity` ends on.
+    It seems to be larger than in the venue by `deviation` ± `sigma`, in the unit at the end of `quantity`.
     """
 
     camera: Id | None
@@ -246,10 +254,10 @@ class Suspicion(Schema):
 
 
 class AdoptableNumber(Schema):
-    """A number of the field that the lines determine and contradict, metres.
+    """A dimension of the field that the lines determine and contradict, metres.
 
     It is `given` in the venue that the job began with, and `value` ± `sigma` by the lines. `POST
-    /venues/{id}/adopt-field` stores that value; nothing is stored by itself.
+    /venues/{id}/adopt-field` stores that value; nothing is stored automatically.
     """
 
     name: Annotated[FieldNumber, OPEN_WORD]
@@ -258,39 +266,37 @@ class AdoptableNumber(Schema):
     sigma: float
     moves_m: dict[Id, float] = Field(
         {},
-        description="About how far the positions of the accepted cameras move with it, by camera: the same lines, "
-        "fitted again with that number. The next calibration moves them; storing the number does not.",
+        description="Approximate movement of each accepted camera with the new value, m: the same lines fitted again. "
+        "The next calibration moves the cameras; storing the value does not.",
     )
 
 
 class Result(Schema):
-    """Poses and what they are worth. Stitch errors: 1 px is 10 cm on the pitch; one camera has none."""
+    """Result of a calibration. Stitch errors: 1 px is 10 cm on the pitch; a single camera has none."""
 
-    verdict: Annotated[Verdict, OPEN_WORD] = Field(
-        description="Whether the poses of all cameras are accepted, of some or of none."
-    )
-    accepted: bool = Field(description="Whether those of all cameras are.")
-    rejected_because: str | None = Field(description="All reasons, with the cameras they are about.")
+    verdict: Annotated[Verdict, OPEN_WORD] = Field(description="Acceptance of the poses: of all cameras, some or none.")
+    accepted: bool = Field(description="True if the poses of all cameras are accepted.")
+    rejected_because: str | None = Field(description="All reasons, with the cameras that they concern.")
     cameras: list[CameraResult]
-    ridge: list[Row] | None = Field(None, description="With fit_ridge: as it was found.")
-    diagnosis: list[Suspicion] = Field([], description="What the lines say is wrong with what the venue says.")
+    ridge: list[Row] | None = Field(None, description="With fit_ridge: the ridge that was found.")
+    diagnosis: list[Suspicion] = Field([], description="Parameters of the venue that the lines contradict.")
     adoptable: list[AdoptableNumber] = Field(
-        [], description="Of the diagnosis, the numbers of the field, and what storing each would be."
+        [], description="Dimensions of the field in the diagnosis that can be stored, and the effect of each."
     )
     warnings: list[str] = Field(
-        [], description="What the venue leaves to be assumed: lenses without a `sigma`; pictures that are missing."
+        [], description="Assumptions that the venue leaves open, such as lenses without `sigma`; missing pictures."
     )
     stitch_error_px: float | None
-    stitch_error_before_px: float | None
-    stitch_error_limit_px: float | None = Field(None, description="What the gate lets pass at most.")
-    pairs: list[PairResult] = Field([], description="The cameras that were compared, two by two.")
-    loss: float | None = Field(description="Of the poses that are answered, by the middle level of the search.")
+    stitch_error_before_px: float | None = Field(description="Stitch error of the stored poses in the same frames.")
+    stitch_error_limit_px: float | None = Field(None, description="Largest stitch error that the gate accepts.")
+    pairs: list[PairResult] = Field([], description="Pairs of cameras that were compared.")
+    loss: float | None = Field(description="Loss of the resulting poses, at the middle level of the search.")
     generations: int
     path: Annotated[Literal["near", "wide", "anywhere"], OPEN_WORD] = Field(
         "wide",
         description="`near`: the cameras stand almost as stored, and no search was needed. `wide`: a search around the "
-        "stored poses. `anywhere`: some camera was lost and found again, where it stood, turned by any angle, or, with "
-        "`search` `anywhere`, elsewhere.",
+        "stored poses. `anywhere`: some camera was lost and found again, in another direction from its stored "
+        "position or, with `search` `anywhere`, elsewhere.",
     )
     timings_s: dict[str, float]
     cpu_s: dict[str, float] = CPU_S
@@ -298,16 +304,16 @@ class Result(Schema):
 
     @property
     def recovered_cameras(self) -> list[str]:
-        """Ids of the cameras that were knocked and whose new poses may replace the stored ones."""
+        """Ids of the knocked cameras whose new poses may replace the stored ones."""
         return [camera.id for camera in self.cameras if camera.accepted and camera.knocked]
 
     @property
     def accepted_cameras(self) -> list[str]:
-        """Those whose poses may replace the stored ones."""
+        """Ids of the cameras whose poses may replace the stored ones."""
         return [camera.id for camera in self.cameras if camera.accepted]
 
     def refused(self, because: str, reason: str = "all-or-none") -> Result:
-        """Return the result with every pose refused, for a reason of `REFUSAL_REASONS` (`service.schemas.problems`)."""
+        """Return the result with every pose rejected; `reason`: one of `service.schemas.problems.REFUSAL_REASONS`."""
         cameras = [
             camera.model_copy(update={**refuse_camera(camera.rejected_because, camera.refusal, because, reason)})
             for camera in self.cameras
@@ -316,7 +322,7 @@ class Result(Schema):
 
 
 class PhotoResult(Schema):
-    """What became of a photo. `left_out_px`: how well a lens that was fitted without it foretells its corners (rms)."""
+    """Use of a photo in a lens calibration. `left_out_px`: rms error in it of a lens fitted to the other photos."""
 
     name: str
     fate: Annotated[Literal["used", "no-board", "wrong-size", "hurts"], OPEN_WORD]
@@ -326,14 +332,14 @@ class PhotoResult(Schema):
 
 
 class CoverageResult(Schema):
-    """How much of the picture the board reached; `empty`: the ninths of it without any corner."""
+    """Share of the picture that the board covered; `empty`: the ninths of the picture without any corner."""
 
     share: float
     empty: list[str]
 
 
 class LensTrial(Schema):
-    """A lens that was tried, by its free numbers; rms of the photos it was fitted to and of those it was not."""
+    """A lens that was tried, with its free parameters (`terms`), its rms in the photos and in left-out photos."""
 
     terms: list[str]
     rms_px: float
@@ -341,10 +347,10 @@ class LensTrial(Schema):
 
 
 class IntrinsicsResult(Schema):
-    """A lens from photos of a board, and what it is worth.
+    """A lens from photos of a board, and its uncertainty.
 
-    `sigma`: one standard deviation of each number if every corner were an independent witness; `spread`: by leaving
-    out photos, which is nearer to the truth. `warnings` say what to photograph next.
+    `sigma`: one standard deviation of each parameter if all corners were independent; `spread`: the same by leaving out
+    photos, which is more realistic. `warnings` say what to photograph next.
     """
 
     image_size: list[int]
@@ -363,9 +369,10 @@ class IntrinsicsResult(Schema):
 
 
 class PointResult(Schema):
-    """What became of a click. `exchanged_with`: the point whose label explains it, and it theirs.
+    """Check of a clicked point.
 
-    `looks_like`: the named point it is on instead. `residual_px`: null where the camera cannot see its point.
+    `exchanged_with`: the point that it seems to be swapped with. `looks_like`: the named point that it seems to be
+    instead. `residual_px`: null if the camera cannot see the point.
     """
 
     world: Landmark | Coordinates
@@ -376,9 +383,9 @@ class PointResult(Schema):
 
 
 class LensGain(Schema):
-    """Numbers of the lens that were fitted to the points because the one given does not fit them.
+    """Parameters of the lens that were fitted to the points, because the given lens does not fit them.
 
-    `left_out_px`: rms of points, each where a fit to the others puts it. `evidence`: the gain in BIC; 10 is strong.
+    `left_out_px`: rms error of each point in a fit to the others. `evidence`: gain in BIC; 10 is strong.
     """
 
     given: Intrinsics
@@ -392,7 +399,7 @@ class LensGain(Schema):
 
 
 class LocateSigma(Schema):
-    """One standard deviation of a first pose; `pixels`: of where it puts the clicked points."""
+    """One standard deviation of a first pose; `pixels`: of the projected points in the picture."""
 
     rotation_deg: float
     position_m: float
@@ -400,7 +407,7 @@ class LocateSigma(Schema):
 
 
 class LocateResult(Schema):
-    """A first pose. `accepted`: a calibration can begin with it; `intrinsics` are those that it holds with."""
+    """A first pose from clicked points. `accepted`: a calibration can start from it, with these `intrinsics`."""
 
     accepted: bool
     rejected_because: str | None
@@ -418,10 +425,10 @@ class LocateResult(Schema):
 
 
 class MeasureResult(Schema):
-    """A measure of the pitch, metres: as the venue has it (`given`) and as the lines have it (`value` ± `sigma`).
+    """A dimension of the pitch, metres: in the venue (`given`), and by the lines (`value` ± `sigma`).
 
-    `open`: one standard deviation of what it might have been before. `known`: whether the lines tell it; if not,
-    `detail` says why, and the fitted field keeps what was given.
+    `open`: one standard deviation of it before the fit. `known`: true if the lines determine it; if not, `detail` says
+    why, and the fitted field keeps the given value.
     """
 
     name: Annotated[Literal["length_m", "width_m", "ridge_height_m", "ridge_length_m"], OPEN_WORD]
@@ -434,9 +441,9 @@ class MeasureResult(Schema):
 
 
 class FieldResult(Schema):
-    """A pitch with the measures that its lines tell, and the cameras as they stand around it.
+    """A pitch with the dimensions that its lines determine, and the cameras around it.
 
-    `accepted`: it may replace the one that the venue has; nothing is replaced by itself.
+    `accepted`: it may replace the venue's field; nothing is replaced automatically.
     """
 
     accepted: bool
@@ -452,9 +459,11 @@ class FieldResult(Schema):
 
 
 class CandidateResult(Schema):
-    """A camera that may have taken the frame. `agreement`: how well the lines agree with it both ways, 0..1: is the
-    expected seen, and the seen expected? `lines_found`: the share of the expected that is seen; `residual_px`: rms of
-    the measured lines, null where too few were measured.
+    """A pose and lens that may have taken the frame.
+
+    `agreement`, 0..1: share of the expected lines that are seen, combined with the share of the seen lines that are
+    expected; `lines_found`: share of the expected lines that are seen; `residual_px`: rms of the measured lines, null
+    if too few were measured.
     """
 
     intrinsics: Intrinsics
@@ -479,28 +488,28 @@ FindReason = Annotated[
 
 
 class FoundCameraResult(Schema):
-    """Answer of a search for one camera: `candidates`, the best first; where it is accepted, the first is taken."""
+    """Result of a search for one camera: `candidates`, the best first. If `accepted`, the first one is the camera."""
 
     id: Id
     accepted: bool
-    reason: FindReason | None = Field(description="Why it is not accepted, in a word.")
+    reason: FindReason | None = Field(description="Reason if it is not accepted, in a word.")
     rejected_because: str | None
     remarks: list[str] = Field(
-        description="What was assumed, such as the side of a field that looks the same twice; doubts about its lens."
+        description="Assumptions, such as the side of a symmetric field, and doubts about its lens."
     )
     assumed_side: Annotated[Literal["near", "far", "left", "right"], OPEN_WORD] | None = Field(
         None,
-        description="The side that the first candidate stands on by an assumption about all cameras of the search. "
-        "Where it is wrong, take the second candidate of each of them, half a turn about the field's centre away.",
+        description="Side of the field that the first candidate stands on, by an assumption about all cameras of the "
+        "search. If it is wrong, take the second candidate of each: half a turn about the field's centre away.",
     )
     image_size: list[int]
     candidates: list[CandidateResult]
 
 
 class FindResult(Schema):
-    """Cameras found from their frames alone. `accepted`: all of them were.
+    """Cameras found from their frames. `accepted`: all of them were found.
 
-    Nothing is stored by itself: `POST /venues/{id}/adopt-found` takes what was found.
+    Nothing is stored automatically: `POST /venues/{id}/adopt-found` stores the cameras.
     """
 
     accepted: bool
@@ -508,8 +517,8 @@ class FindResult(Schema):
     cameras: list[FoundCameraResult]
     ridge: list[Row] | None = Field(
         None,
-        description="Of a field that was taken for flat, the ridge that the lines tell; the venue gets it with the "
-        "poses. null: they tell none, or the field has one.",
+        description="Ridge that the lines determine for a field that was given as flat; it is stored with the poses. "
+        "Null: none was found, or the field has one.",
     )
     stitch_error_px: float | None
     warnings: list[str] = Field([], description="Pictures that are missing.")
@@ -518,9 +527,9 @@ class FindResult(Schema):
     provenance: Provenance
 
     def chosen(self, choice: Mapping[str, int | None] = NO_CHOICE) -> dict[str, CandidateResult]:
-        """The candidate that each camera is taken to be, by camera.
+        """Return the chosen candidates by camera.
 
-        `choice`: the number of one from 1, or None where none is taken; a camera that it does not name is its first
+        `choice`: number of a candidate from 1, or None for no candidate; a camera that it does not name gets its first
         candidate if that is accepted.
         """
         first = {camera.id: 1 for camera in self.cameras if camera.accepted}

@@ -1,4 +1,4 @@
-"""Rotations without any library, for what must start at once."""
+"""Rotation of vectors without NumPy, for commands that must start quickly."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 
 
 def rotate(rotation: list[float], vector: list[float]) -> list[float]:
-    """A vector turned by a Rodrigues vector (rad): Rodrigues' formula."""
+    """Return a vector rotated by a Rodrigues vector (rad)."""
     angle = math.hypot(*rotation)
     if angle == 0.0:
         return list(vector)

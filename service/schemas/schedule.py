@@ -1,7 +1,7 @@
-"""Schedules of venues and when they fire: cron's five fields, in a time zone.
+"""Schedules of venues and the times at which they fire: cron's five fields, in a time zone.
 
-Thousands of venues have the same five fields, and cameras, network and queue would have all of them at once. So each
-fires a little after its time, by its name always the same: at most a quarter of an hour, and before its next time.
+Thousands of venues may have the same cron expression. So that they do not all load cameras, network and queue at once,
+each fires with a fixed delay of its own: at most 15 minutes, and never after its next time.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from service.schemas.base import Flag, Integer, Number, Schema, is_tolerant
 from service.schemas.options import Options
 
 FIELDS = 5
-# All of them are fetched within the ten minutes after which another worker would begin.
+# All frames must be fetched within ten minutes, after which another worker would begin.
 MOST_FRAMES = 16
 LONGEST_SPACING_S = 30
 SPACING_S = 5.0
@@ -25,7 +25,7 @@ LONGEST_SPREAD = timedelta(minutes=15)
 
 
 class Schedule(Schema):
-    """When the service calibrates a venue by itself, with frames from the sources of its cameras."""
+    """Schedule of automatic calibrations, with frames from the sources of the venue's cameras."""
 
     model_config = ConfigDict(
         json_schema_extra={"examples": [{"cron": "*/15 6-23 * * *", "time_zone": "Europe/Berlin"}]}
@@ -34,54 +34,54 @@ class Schedule(Schema):
     cron: Annotated[str, StringConstraints(max_length=100)] = Field(
         description="Cron's five fields: minute, hour, day, month, day of the week."
     )
-    time_zone: Annotated[str, StringConstraints(max_length=64)] = Field("UTC", description="A name of IANA's.")
+    time_zone: Annotated[str, StringConstraints(max_length=64)] = Field("UTC", description="IANA time zone.")
     exact: Flag = Field(
         False,
-        description="Fire at these times to the second. Otherwise up to 15 minutes later, never after the next time, "
-        "and always by the same share of it: venues with the same schedule do not all come at once.",
+        description="Fire exactly at these times. Otherwise up to 15 minutes later, always with the same delay for a "
+        "venue, so that venues with the same schedule do not fire together.",
     )
-    # Left out where nobody asked for more: what reads venues of 0.1.0 knows neither.
+    # Left out at their defaults: version 0.1.0 knows neither field.
     frames: Annotated[Integer, Field(ge=1, le=MOST_FRAMES)] = Field(
         1,
         exclude_if=lambda frames: frames == 1,
-        description="Of each camera, fused into one picture: what moves between them, players say, is removed.",
+        description="Frames of each camera, fused into one picture: whatever moves, such as players, is removed.",
     )
     spacing_s: Annotated[Number, Field(ge=0.1, le=LONGEST_SPACING_S)] = Field(
         SPACING_S,
         exclude_if=lambda spacing_s: spacing_s == SPACING_S,
-        description="From the beginning of one frame to the next, where there are several.",
+        description="Time from one frame to the next.",
     )
-    options: Options | None = Field(None, description="Of its calibrations; absent: what they are when none are given.")
+    options: Options | None = Field(None, description="Options of the calibrations; absent: the defaults.")
 
     @model_validator(mode="after")
     def _fires(self, info: ValidationInfo) -> Self:
-        # What another version let through was checked there.
+        # Another version has checked it.
         if is_tolerant(info):
             return self
         try:
             next_time(self.cron, self.time_zone, datetime.now(UTC))
         except ModuleNotFoundError as missing:
-            # The client that is installed alone comes without it. Then the service says what is no schedule.
+            # The client alone is installed without croniter; then the service checks the schedule.
             if missing.name != "croniter":
                 raise
         return self
 
 
 class ScheduleState(Schema):
-    """When a venue is calibrated next, and what came of the last time."""
+    """Next and last run of a venue's schedule."""
 
     next_at: datetime
-    last_at: datetime | None = Field(description="The last time; null: it has not come yet.")
-    last_job: str | None = Field(description="Of the last time; one that had no frames to compute has failed.")
-    last_error: str | None = Field(description="Why the last time brought no poses, or is put off.")
+    last_at: datetime | None = Field(description="Time of the last run; null: none yet.")
+    last_job: str | None = Field(description="Job of the last run; it has failed if there were no frames.")
+    last_error: str | None = Field(description="Reason why the last run brought no poses, or is postponed.")
 
 
 class InvalidSchedule(ValueError):  # noqa: N818
-    """The schedule never fires; the message says why."""
+    """Raised for a schedule that is invalid or never fires; the message says why."""
 
 
 def phase_of(venue_id: str) -> float:
-    """Return the phase of a venue, 0 (included) to 1: the share of the delay by which it fires after a cron time."""
+    """Return the phase of a venue, 0 (included) to 1: its share of the largest delay after a cron time."""
     return int.from_bytes(hashlib.sha256(venue_id.encode()).digest()[:4]) / 2**32
 
 
@@ -93,7 +93,7 @@ def next_time(cron: str, time_zone: str, after: datetime, phase: float = 0.0) ->
     """
     if not phase:
         return _next_local_time(cron, time_zone, after)
-    # What is a little late may be of a time that has come before.
+    # The delayed run of an earlier cron time may still be to come.
     time = _next_local_time(cron, time_zone, after - LONGEST_SPREAD)
     while True:
         following = _next_local_time(cron, time_zone, time)
@@ -104,7 +104,7 @@ def next_time(cron: str, time_zone: str, after: datetime, phase: float = 0.0) ->
 
 
 def _next_local_time(cron: str, time_zone: str, after: datetime) -> datetime:
-    # The commands of the client, which start anew each time, seldom look at a schedule.
+    # Imported late: commands of the client must start quickly and seldom need it.
     from croniter import CroniterError, croniter
 
     if len(cron.split()) != FIELDS:

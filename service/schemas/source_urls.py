@@ -1,4 +1,4 @@
-"""Secrets in the address of a camera: user and password before the host, and those that cameras take as parameters."""
+"""Secrets in the address of a camera: user and password before the host, and secret parameters."""
 
 from __future__ import annotations
 
@@ -9,30 +9,30 @@ from dataclasses import dataclass
 from service.schemas.addresses import HIDDEN
 
 AUTHORITY = re.compile(r"([a-z]+://)(?:([^/?]*)@)?([^/?#]*)(.*)", re.DOTALL)
-# As makers of cameras call them.
+# Names of secret parameters among makers of cameras.
 NAMES = (
     "usr|user|user_?name|login|loginuse|account|pwd|pass|passwd|password|passcode|passphrase|loginpas|pw|psw|"
     "token|access_?token|auth|authorization|auth_?basic|key|api_?key|secret|sig|signature|session|session_?id|sid"
 )
-# Of a path a parameter ends with its part, as in /user=admin&password=x/stream; in a query it may have slashes.
+# In a path, a value ends at a slash, as in /user=admin&password=x/stream; in a query it may have slashes.
 PARAMETER = re.compile(rf"(?P<begin>[/&;])(?P<name>{NAMES})=(?P<value>[^&;/?#]+)", re.IGNORECASE)
 OF_A_QUERY = re.compile(rf"(?P<begin>[?&;])(?P<name>{NAMES})=(?P<value>[^&;#]+)", re.IGNORECASE)
 
 
 class UnknownSecret(Exception):  # noqa: N818
-    """A secret is to be kept that nobody knows; the message names it."""
+    """Raised if a hidden secret is sent back that is not stored; the message names it."""
 
 
 @dataclass(frozen=True)
 class SourceSecrets:
-    """What is secret in a source: user and password as they stand in it, and parameters in their order."""
+    """Secrets of a source: user and password as written, and secret parameters in their order."""
 
     userinfo: str | None = None
     parameters: tuple[tuple[str, str], ...] = ()
 
     @classmethod
     def decoded(cls, text: str) -> SourceSecrets:
-        """Read secrets from the form that is stored: what stands before the host and, behind a `?`, the parameters."""
+        """Return the secrets of the stored form: user and password and, after a `?`, the parameters."""
         userinfo, _, rest = text.partition("?")
         parameters = tuple(
             (name, value) for name, _, value in (part.partition("=") for part in rest.split("&") if part)
@@ -40,12 +40,12 @@ class SourceSecrets:
         return cls(userinfo or None, parameters)
 
     def encoded(self) -> str:
-        """As they are kept; empty where there are none."""
+        """Return the form that is stored; empty without secrets."""
         parameters = "&".join(f"{name}={value}" for name, value in self.parameters)
         return (self.userinfo or "") + (f"?{parameters}" if parameters else "")
 
     def fill_hidden(self, known: SourceSecrets) -> SourceSecrets:
-        """Return the secrets with what is `known` wherever one is hidden (`***`); raises `NotKnown`."""
+        """Return the secrets with hidden ones (`***`) replaced by `known` ones. Raises `UnknownSecret`."""
         userinfo = self.userinfo
         if userinfo == HIDDEN:
             userinfo = known.userinfo
@@ -59,15 +59,15 @@ class SourceSecrets:
         name, value = self.parameters[number]
         if value != HIDDEN:
             return name, value
-        # One that stands there twice is told apart by its place among those of its name.
-        place = [its for its, _ in self.parameters[:number]].count(name)
-        values = [kept for its, kept in known.parameters if its == name]
+        # Parameters of the same name are matched in their order.
+        place = [other for other, _ in self.parameters[:number]].count(name)
+        values = [known_value for other, known_value in known.parameters if other == name]
         if place >= len(values):
             raise UnknownSecret(f"`{name}`")
         return name, values[place]
 
     def redact(self, text: str) -> str:
-        """The text without them, where something repeats an address whole."""
+        """Return a text, such as an error that repeats an address, with the secrets hidden."""
         if self.userinfo is not None:
             text = text.replace(self.userinfo, HIDDEN)
         for name, value in self.parameters:
@@ -76,17 +76,17 @@ class SourceSecrets:
 
 
 def hide_secrets(url: str) -> str:
-    """A source as it is shown."""
+    """Return the address of a source with its secrets hidden."""
     return _split(url)[0]
 
 
 def secrets_of(url: str) -> SourceSecrets:
-    """What is not shown of a source."""
+    """Return the secrets in the address of a source."""
     return _split(url)[1]
 
 
 def with_parameters(url: str, secrets: SourceSecrets) -> str:
-    """The address of a shown source with its parameters, and without user and password."""
+    """Return a shown address with its secret parameters filled in, and without user and password."""
     values = iter(secrets.parameters)
 
     def value(name: str, there: str) -> str:
@@ -110,13 +110,13 @@ def _split(url: str) -> tuple[str, SourceSecrets]:
 
 
 def _parts(url: str) -> tuple[str, str | None, str, str]:
-    """Scheme with its slashes, user and password (None: there are none), host with its port, and the rest."""
+    """Split an address into scheme with slashes, user and password or None, host with port, and the rest."""
     found = AUTHORITY.fullmatch(url)
     return (found[1], found[2], found[3], found[4]) if found else ("", None, "", url)
 
 
 def _replaced(rest: str, value: Callable[[str, str], str]) -> str:
-    """Path and query with other values of the parameters that are secret."""
+    """Return path and query with the values of secret parameters replaced by `value(name, value)`."""
 
     def one(found: re.Match[str]) -> str:
         return f"{found['begin']}{found['name']}={value(found['name'], found['value'])}"

@@ -1,7 +1,7 @@
-"""How each camera has moved since its anchor, night by night, and what control charts say of it.
+"""Models of trends: the movement of each camera since its anchor, night by night, with control charts.
 
-The anchor of a camera is its first accepted pose after somebody last said where it is: a PUT that changed the camera, a
-result that was accepted by hand, an older revision that was put back.
+The anchor of a camera is its first accepted pose after somebody last set its pose: by a PUT that changed the camera, a
+result accepted by hand, or a restored revision.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from service.schemas.geometry import PosedCamera
 
 
 class Anchor(BaseModel):
-    """What a worker compares a camera with: the camera `posed` as it was when its trend began, in that `revision`."""
+    """Reference of a camera's trend: its pose and lens (`posed`) as of `revision`, where the trend began."""
 
     model_config = ConfigDict(frozen=True)
 
@@ -25,33 +25,34 @@ class Anchor(BaseModel):
 
 
 class Displacement(Schema):
-    """Where a camera now puts the ground at the farthest marking in view of its anchor, beside where the anchor had it.
+    """Movement of a camera from its anchor, as a shift of the ground at the farthest marking in the anchor's view.
 
     For a camera on the long side of a pitch that is the far touchline. Metres on the ground; `across`: to the right in
-    the picture, `away`: along the line of sight. `sigma`: one standard deviation by the pose; `repeatability`: the part
-    of it in which the lens and the field, the same the next time, have no part.
+    the picture, `away`: along the line of sight. `sigma`: one standard deviation by the pose; `repeatability`: its part
+    that changes from night to night, without errors of the lens and the field.
     """
 
-    anchor: int | None = Field(description="The revision that it is counted from; null: the camera had no anchor yet.")
-    at: list[float] = Field(description="That place of the pitch, [x, y] in metres.")
+    anchor: int | None = Field(description="Revision of the anchor; null: the camera had none yet.")
+    at: list[float] = Field(description="Point of the pitch at which the shift is given, [x, y] in metres.")
     across_m: float
     away_m: float
     sigma_across_m: float
     sigma_away_m: float
     repeatability_across_m: float
     repeatability_away_m: float
-    rotation_deg: float = Field(description="By how much the camera is turned from its anchor.")
-    position_m: float = Field(description="How far it is from its anchor.")
+    rotation_deg: float = Field(description="Rotation of the camera from its anchor.")
+    position_m: float = Field(description="Distance of the camera from its anchor.")
     focal_length: float | None = Field(
-        None, description="The part by which the focal length that the lines speak for is longer than the anchor's."
+        None,
+        description="Relative difference of the focal length, by the lines, from the anchor's: 0.001 is 0.1 % more.",
     )
     sigma_focal_length: float | None = None
     focal_length_m: float = Field(
-        0.0, description="How far that place moves on the ground for a focal length that is longer by all of it."
+        0.0, description="Shift of the point on the ground per unit of `focal_length`, that is for a doubled one, m."
     )
 
     def as_anchor(self) -> Displacement:
-        """The displacement of a pose that is the anchor itself."""
+        """Return the displacement of the anchor itself: zero."""
         still = {"anchor": None, "across_m": 0.0, "away_m": 0.0, "rotation_deg": 0.0, "position_m": 0.0}
         return self.model_copy(update=still)
 
@@ -61,35 +62,35 @@ TrendState = Literal["too-few-nights", "jumped", "quiet", "drifting", "alarm"]
 
 
 class Chart(Schema):
-    """Where the control charts of one quantity stand after a night.
+    """State of the control charts of one quantity after a night.
 
-    In standard deviations of what the quantity usually does, but for `value` and `mean`: the quantity itself and its
-    moving average (EWMA), beside what is usual, in metres (`across`, `away`) or as a part (`focal-length`).
+    `value` and `mean` are the quantity and its moving average (EWMA) relative to the baseline, in metres (`across`,
+    `away`) or as a share (`focal-length`); `ewma` and the sums are in standard deviations.
     """
 
     quantity: Annotated[Quantity, OPEN_WORD]
     value: float
     mean: float
-    mean_m: float = Field(description="What `mean` amounts to at the far touchline, in metres.")
-    spread: float = Field(description="One standard deviation that `value` may have by what is usual.")
-    ewma: float = Field(description="Weight 0.2.")
-    ewma_limit: float = Field(description="Three standard deviations of the EWMA, as many nights after the anchor.")
-    cusum_high: float = Field(description="Upward sum, slack 0.5.")
-    cusum_low: float = Field(description="Downward sum, slack 0.5.")
-    cusum_limit: float = Field(5.0, description="Above it a sum says that the mean has moved.")
-    beyond: bool = Field(description="Whether either chart says so.")
+    mean_m: float = Field(description="`mean` as a distance at the far touchline, in metres.")
+    spread: float = Field(description="Usual standard deviation of `value`.")
+    ewma: float = Field(description="Exponentially weighted moving average, weight 0.2.")
+    ewma_limit: float = Field(description="Limit of the EWMA: three of its standard deviations after these nights.")
+    cusum_high: float = Field(description="Upward cumulative sum, slack 0.5.")
+    cusum_low: float = Field(description="Downward cumulative sum, slack 0.5.")
+    cusum_limit: float = Field(5.0, description="Limit of the sums: above it the mean has moved.")
+    beyond: bool = Field(description="True if either chart is beyond its limit.")
 
 
 class TrendPoint(Schema):
     """A night: the mean of its accepted jobs, compared with the anchor.
 
     `displacement_m` ± `sigma_m`: at the farthest marking in view, on the ground. `focal_length` ± `sigma_focal_length`:
-    the part by which the focal length is longer than the anchor's; null where the lines were not asked for it.
+    relative difference from the anchor's focal length; null if it was not fitted.
     """
 
-    at: datetime = Field(description="When the last of its jobs ended.")
-    job: str = Field(description="That job.")
-    jobs: int = Field(description="How many there were.")
+    at: datetime = Field(description="Time at which the last job of the night ended.")
+    job: str = Field(description="The last job of the night.")
+    jobs: int = Field(description="Number of jobs.")
     displacement_m: float
     sigma_m: float
     across_m: float
@@ -100,7 +101,7 @@ class TrendPoint(Schema):
     sigma_position_m: float | None
     focal_length: float | None
     sigma_focal_length: float | None
-    charts: list[Chart] = Field(description="Of the quantities that were measured that night.")
+    charts: list[Chart] = Field(description="Control charts of the quantities that were measured that night.")
     state: Annotated[TrendState, OPEN_WORD]
 
 
@@ -129,14 +130,18 @@ class Trend(Schema):
 
     venue: Id
     camera: Id
-    anchor: int | None = Field(description="The revision of the anchor; null: no pose was accepted since it was put.")
-    since: datetime | None = Field(description="When that was accepted.")
-    state: Annotated[TrendState, OPEN_WORD] = Field(
-        description="`drifting`: a chart says that the mean has moved; `alarm`: and by at least `alarm_m`. Before "
-        "there are four nights `too-few-nights`, or `jumped`: the last pose is `alarm_m` and three sigma off."
+    anchor: int | None = Field(
+        description="Revision of the anchor; null: no pose was accepted since the camera's pose was set."
     )
-    words: str = Field(description="That in a sentence.")
-    alarm_m: float = Field(description="At the far touchline; `alarms.trend_m` of the venue, or the usual.")
-    moved_m: float = Field(description="Where the moving average is at the far touchline, beside what is usual.")
-    baseline_nights: int = Field(description="Nights by which it is told what is usual: 20, or all if they are fewer.")
-    points: list[TrendPoint] = Field(description="Night by night, oldest first.")
+    since: datetime | None = Field(description="Time at which the anchor was accepted.")
+    state: Annotated[TrendState, OPEN_WORD] = Field(
+        description="`drifting`: a chart is beyond its limit; `alarm`: by at least `alarm_m`. With fewer than four "
+        "nights: `too-few-nights`, or `jumped` if the last pose is off by `alarm_m` and three sigma."
+    )
+    words: str = Field(description="The state in a sentence.")
+    alarm_m: float = Field(
+        description="Alarm limit at the far touchline, m: `alarms.trend_m` of the venue, or the default."
+    )
+    moved_m: float = Field(description="Moving average at the far touchline relative to the baseline, m.")
+    baseline_nights: int = Field(description="Number of nights that make the baseline, at most 20.")
+    points: list[TrendPoint] = Field(description="Nights, oldest first.")

@@ -1,4 +1,4 @@
-"""A venue as it is sent and as it is kept: a pitch and the cameras around it."""
+"""Models of a venue in requests and answers: a pitch and the cameras around it."""
 
 from __future__ import annotations
 
@@ -33,27 +33,27 @@ T = TypeVar("T", Alarms | None, Options | None)
 Accept = Annotated[
     Literal["each", "all"],
     OPEN_WORD,
-    Field(description="Of a calibration: `each` pose that passes the gate, or `all` of them if all do and else none."),
+    Field(description="Poses that a calibration stores: `each` that passes the gate, or `all` only if all pass."),
 ]
 Lens = Annotated[
     Literal["fixed", "may-drift"],
     OPEN_WORD,
     Field(
-        description="Of cameras whose zoom or focus moved: `fixed` rejects the pose, `may-drift` accepts it with the "
-        "focal length that was found."
+        description="Handling of cameras whose zoom or focus moved: `fixed` rejects the pose, `may-drift` accepts it "
+        "with the focal length that was found."
     ),
 ]
 Recover = Annotated[
     Literal["propose", "accept"],
     OPEN_WORD,
     Field(
-        description="Of a camera that was knocked by more than 8 degrees or 1.5 m and found again: `propose` rejects "
-        "the pose until somebody accepts the job, `accept` stores it at once."
+        description="Handling of a camera that was knocked by more than 8 degrees or 1.5 m and found again: `propose` "
+        "rejects the pose until somebody accepts the job, `accept` stores it at once."
     ),
 ]
 
 Webhooks = Annotated[
-    list[Webhook], Field(max_length=8, description="Told of what happens to the venue, and of new poses with them.")
+    list[Webhook], Field(max_length=8, description="Addresses that get events of the venue, such as new poses.")
 ]
 
 
@@ -63,27 +63,26 @@ Ignore = Annotated[
     list[Polygon],
     Field(
         max_length=50,
-        description="Areas of the frame that are of no use, polygons of [x, y] in pixels: nothing in them counts as a "
-        "marking, is measured or is missed.",
+        description="Areas of the frame to ignore, polygons of [x, y] in pixels: nothing in them is detected, measured "
+        "or expected.",
         examples=[[[[0, 1900], [900, 1900], [900, 2159], [0, 2159]]]],
     ),
 ]
 
-LIGHT = "How it is evened out with the others in a stitched view; accepted calibrations find it and keep it steady."
+LIGHT = "Photometric correction for stitched views; accepted calibrations measure it and change it slowly."
 
 
 class CameraIn(UnposedCamera):
-    """A camera of a venue as it is sent."""
+    """A camera of a venue in a request."""
 
     pose: PoseIn
     ignore: Ignore = Field([])
     light: Light | None = Field(None, description=LIGHT)
     source: SourceUrl | None = Field(
         None,
-        description="Where its frames can be fetched: the address of a JPEG or PNG, of motion JPEG, or an RTSP stream. "
-        f"User and password, also in parameters such as `pwd=`, are not shown again: `{HIDDEN}` stands for them, and "
-        "sent back keeps them. Certificates of https and rtsps are verified; behind `#tls_sha256=` stands the SHA-256 "
-        "of one that the camera signed itself.",
+        description="Address of its frames: a JPEG or PNG, motion JPEG, or an RTSP stream. User and password, also in "
+        f"parameters such as `pwd=`, are shown as `{HIDDEN}`; sending `{HIDDEN}` back keeps them. Certificates of "
+        "https and rtsps are verified; `#tls_sha256=` and its SHA-256 accept one that the camera signed itself.",
         examples=["http://user:password@10.1.0.7/snapshot.jpg"],
     )
 
@@ -117,14 +116,14 @@ class Camera(PosedCamera):
 
     ignore: Ignore = Field([])
     light: Light | None = Field(None, description=LIGHT)
-    # What was put before parameters counted as secret has them here still.
+    # Old versions stored parameters that count as secret now.
     source: Annotated[str, AfterValidator(source_urls.hide_secrets)] | None = Field(
-        None, description="Where its frames can be fetched."
+        None, description="Address of its frames, without secrets."
     )
 
     @property
     def posed(self) -> PosedCamera:
-        """What a calibration says of it, and nothing else."""
+        """Id, image size, lens and pose of the camera."""
         return PosedCamera(id=self.id, image_size=self.image_size, intrinsics=self.intrinsics, pose=self.pose)
 
 
@@ -155,9 +154,9 @@ VENUE_EXAMPLE: dict[str, Any] = {
 
 PATCH_EXAMPLES: dict[str, Any] = {
     "an alarm": {"value": {"alarms": {"rejected_in_a_row": 3}}},
-    "who is told of new poses": {"value": {"webhooks": [WEBHOOK_EXAMPLE]}},
+    "a webhook for new poses": {"value": {"webhooks": [WEBHOOK_EXAMPLE]}},
     "no schedule": {"value": {"schedule": None}},
-    "what its stitched view shows": {"value": {"view": VIEW_EXAMPLE}},
+    "settings of the stitched view": {"value": {"view": VIEW_EXAMPLE}},
     "the source of a camera": {"value": {"cameras": {"left": {"source": "http://10.1.0.7/snapshot.jpg"}}}},
 }
 
@@ -169,7 +168,7 @@ def require_distinct_ids(ids: Sequence[str]) -> None:
 
 
 class NamedField(Schema):
-    """What every venue has, whether its cameras have poses or not."""
+    """Id, name and field of a venue."""
 
     id: Id
     name: Name = ""
@@ -177,24 +176,32 @@ class NamedField(Schema):
 
 
 class Site(NamedField):
-    """The file of a venue before its cameras have poses: the pitch, and the cameras that are known."""
+    """A venue file that may not have cameras yet."""
 
     cameras: list[CameraIn] = Field([])
 
 
-class VenueIn(NamedField):
-    """A venue as it is sent."""
+class _VenueSettings(NamedField):
+    """A venue without the type of its cameras."""
 
-    model_config = ConfigDict(json_schema_extra={"examples": [VENUE_EXAMPLE]})
-
-    cameras: Annotated[list[CameraIn], Field(min_length=1, max_length=32)]
+    cameras: list[Any]
     accept: Accept = "each"
     lens: Lens = "fixed"
     recover: Recover = "propose"
     alarms: Alarms | None = None
     schedule: Schedule | None = None
     webhooks: Webhooks = Field([])
-    view: ViewChoice | None = Field(None, description="What its stitched view shows; null: what suits the cameras.")
+    view: ViewChoice | None = Field(
+        None, description="Settings of its stitched view; null: chosen to suit the cameras."
+    )
+
+
+class VenueIn(_VenueSettings):
+    """A venue in a request."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [VENUE_EXAMPLE]})
+
+    cameras: Annotated[list[CameraIn], Field(min_length=1, max_length=32)]
     warnings: list[str] = Field(
         [], exclude=True, description="Ignored: so that what answers a PUT can be put again as it is."
     )
@@ -220,108 +227,100 @@ class VenueIn(NamedField):
         }
 
     def to_venue(self) -> Venue:
-        """The venue with poses in both conventions."""
+        """Return the venue with poses in both conventions."""
         cameras = [Camera(**dict(camera) | {"pose": Pose.from_input(camera.pose)}) for camera in self.cameras]
         parts = {name: value for name, value in self if name != "warnings"}
         return Venue(**parts | {"cameras": cameras})
 
 
-class Venue(NamedField):
-    """A venue with the poses that hold now."""
+class Venue(_VenueSettings):
+    """A venue with its current poses."""
 
     cameras: list[Camera]
-    accept: Accept = "each"
-    lens: Lens = "fixed"
-    recover: Recover = "propose"
-    alarms: Alarms | None = None
-    schedule: Schedule | None = None
-    webhooks: Webhooks = Field([])
-    view: ViewChoice | None = Field(None, description="What its stitched view shows; null: what suits the cameras.")
 
     @property
     def poses(self) -> dict[str, Pose]:
-        """Where each camera stands and looks, by its id."""
+        """Poses by camera."""
         return {camera.id: camera.pose for camera in self.cameras}
 
     @property
     def lights(self) -> dict[str, Light]:
-        """How cameras are evened out with the others, by the ids of those of which it is known."""
+        """Photometric corrections by camera, of the cameras that have one."""
         return {camera.id: camera.light for camera in self.cameras if camera.light is not None}
 
     @property
     def lens_warnings(self) -> list[str]:
-        """What is doubtful about the lenses of its cameras, a line each."""
-        # NumPy takes its time to load, and most that reads venues asks nothing of their lenses.
+        """Warnings about the lenses of its cameras, a line each."""
+        # Imported late: NumPy loads slowly, and most readers of venues do not need it.
         from service.schemas.lens_map import lens_warnings
 
         return [words for camera in self.cameras for words in lens_warnings(camera)]
 
     @property
     def poses_and_lenses(self) -> list[PosedCamera]:
-        """Where the cameras stand and how they image: the same, however well their lenses are known."""
+        """Cameras without the uncertainty of their lenses, for comparing venues."""
         return [camera.posed.pose_and_lens for camera in self.cameras]
 
     @property
     def callbacks(self) -> list[str]:
-        """All addresses that are told of something."""
-        told = (self.alarms, None if self.schedule is None else self.schedule.options)
-        others = [one.callback_url for one in told if one is not None and one.callback_url is not None]
+        """URLs of all webhooks and callbacks of the venue."""
+        parts = (self.alarms, None if self.schedule is None else self.schedule.options)
+        others = [part.callback_url for part in parts if part is not None and part.callback_url is not None]
         return [webhook.url for webhook in self.webhooks] + others
 
     def with_hidden_callbacks(self) -> Self:
-        """The venue as it is shown: without the addresses that it tells, which may be secrets."""
+        """Return the venue for an answer: URLs of callbacks are shortened, since their paths may be secret."""
         return self._with_callbacks(hidden_urls.hide_path)
 
     def with_callbacks_of(self, before: Venue | None) -> Self:
-        """The venue with the addresses that it had before wherever it has what was shown of them."""
+        """Return the venue with shortened URLs of callbacks replaced by the full ones that it had before."""
         known = [] if before is None else before.callbacks
         return self._with_callbacks(lambda url: hidden_urls.restore_url(url, known))
 
     def _with_callbacks(self, change: Callable[[str], str]) -> Self:
-        def changed(told: T) -> T:
-            url = None if told is None or told.callback_url is None else change(told.callback_url)
-            return told if told is None else told.model_copy(update={"callback_url": url})
+        def changed(part: T) -> T:
+            url = None if part is None or part.callback_url is None else change(part.callback_url)
+            return part if part is None else part.model_copy(update={"callback_url": url})
 
         schedule = self.schedule and self.schedule.model_copy(update={"options": changed(self.schedule.options)})
         webhooks = [webhook.model_copy(update={"url": change(webhook.url)}) for webhook in self.webhooks]
         return self.model_copy(update={"alarms": changed(self.alarms), "schedule": schedule, "webhooks": webhooks})
 
     def with_poses(self, poses: dict[str, Pose]) -> Venue:
-        """The same venue, cameras moved."""
+        """Return the venue with other poses of the named cameras."""
         cameras = [camera.model_copy(update={"pose": poses.get(camera.id, camera.pose)}) for camera in self.cameras]
         return self.model_copy(update={"cameras": cameras})
 
     def to_input(self) -> VenueIn:
-        """The venue as one sends it."""
+        """Return the venue as a request has it."""
         once = {"cameras": {"__all__": {"pose": {"translation"}}}}
         return VenueIn.model_validate(self.model_dump(exclude=once))
 
     def changed_parts(self, other: Venue) -> list[str]:
-        """The parts of the venue that are not as those of another one."""
+        """Return the names of the fields that differ from another venue's."""
         return [name for name in type(self).model_fields if getattr(self, name) != getattr(other, name)]
 
     def has_same_poses_as(self, other: Venue) -> bool:
-        """Whether the cameras of both are the same and stand alike, with the ridge that their poses belong to."""
+        """True if both have the same cameras with the same poses and lenses, and the same ridge."""
         return self.poses_and_lenses == other.poses_and_lenses and self.field.ridge == other.field.ridge
 
     def has_same_calibration_input_as(self, other: Venue) -> bool:
-        """Whether a calibration of the one is a calibration of the other: same pitch, lenses and stored poses."""
+        """True if both have the same field, lenses and poses, so that a calibration of one is one of the other."""
         return self.field == other.field and self.poses_and_lenses == other.poses_and_lenses
 
     def accepts_frames_of(self, other: Venue) -> bool:
-        """Whether frames of the one are frames of the other: same pitch and lenses, wherever the cameras stand."""
+        """True if frames of the other can be calibrated here: same field, cameras and lenses, whatever their poses."""
         return self.has_same_calibration_input_as(other.with_poses(self.poses))
 
 
 class ChangedVenue(Venue):
-    """A venue as it was put or patched, with what it leaves to be assumed."""
+    """A venue after PUT or PATCH, with warnings."""
 
     warnings: list[str] = Field(
         [],
-        description="Of poses from which no field is filmed, with the convention that would explain them, and of "
-        "lenses: those without a `sigma`, without rays for a part of the picture, of another resolution; and of a "
-        "field of its sport's usual size without a `sigma`. Not kept: GET does not show it, and PUT takes it and "
-        "ignores it.",
+        description="Warnings about poses that do not see the field, with the convention that would explain them; "
+        "about lenses without a `sigma`, without rays for a part of the picture, or of another resolution; and about "
+        "a field of default size without a `sigma`. Not stored: GET does not show them, and PUT ignores them.",
         examples=[
             [
                 "camera west: its lens has no sigma and is taken to be as sure as a good board leaves it, "
@@ -332,23 +331,23 @@ class ChangedVenue(Venue):
 
     @classmethod
     def of(cls, venue: Venue, pose_warnings: list[str]) -> ChangedVenue:
-        """The answer to whoever changed a venue."""
+        """Return the answer to a change of a venue."""
         return cls(**dict(venue), warnings=pose_warnings + venue.lens_warnings + venue.field.warnings)
 
 
 class RestoredVenue(Venue):
-    """A venue as a revision had it, with what that revision could not bring back."""
+    """A venue after a revision was restored, with warnings."""
 
     warnings: list[str] = Field(
         [],
         exclude_if=is_empty,
-        description="What was lost by it; absent where nothing was. Not kept: GET does not show it, PUT ignores it.",
+        description="Data that the restored revision no longer has; absent if nothing was lost. Not stored.",
         examples=[["the nights that cameras left, right remember are dropped: revision 1 has none any more"]],
     )
 
 
 class VenueSummary(Schema):
-    """A venue in a line: its name and its cameras, what rings, and how its last calibration ended."""
+    """Summary of a venue: name, cameras, active alarms and last calibration."""
 
     id: Id
     name: Name
@@ -356,7 +355,7 @@ class VenueSummary(Schema):
     scheduled: bool
     state: Annotated[Literal["ok", "alarm"], OPEN_WORD]
     alarms: list[Alarm]
-    last: CalibrationEnd | None = Field(description="Null before the first calibration has ended.")
+    last: CalibrationEnd | None = Field(description="Last calibration that ended; null: none yet.")
 
 
 class Venues(Schema):
@@ -364,7 +363,7 @@ class Venues(Schema):
 
     venues: list[Venue]
     summaries: list[VenueSummary] | None = Field(
-        None, exclude_if=is_none, description="With `fields=summary`, where `venues` is empty; not there otherwise."
+        None, exclude_if=is_none, description="Only with `fields=summary`, and then instead of `venues`."
     )
     unreadable: list[Unreadable] = Field([], exclude_if=is_empty, description=UNREADABLE)
     next_cursor: str | None = None

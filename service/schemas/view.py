@@ -1,4 +1,4 @@
-"""What a stitched view shows: as a venue keeps it, and as a request has it otherwise."""
+"""Settings of a stitched view: stored with a venue, or overridden by a request."""
 
 from __future__ import annotations
 
@@ -21,30 +21,32 @@ VIEW_EXAMPLE: dict[str, Any] = {"projection": "cylinder", "width_px": 3840, "hei
 
 
 class ViewChoice(Schema):
-    """What is wanted of the stitched view; null: as it suits the cameras."""
+    """Projection, size and crop of a stitched view; null: chosen to suit the cameras."""
 
     projection: Annotated[Projection, OPEN_WORD] = Field(
         "pannini",
-        description="`pannini`: wide, with straight verticals and straight lines towards its middle. `cylinder`: wider "
-        "still. `rectilinear`: as a camera without distortion. `birds-eye`: the pitch from above, of which nothing but "
-        "the size can be chosen.",
+        description="`pannini`: wide, with straight verticals and straight lines towards its middle. `cylinder`: even "
+        "wider. `rectilinear`: like a camera without distortion. `birds-eye`: the pitch from above; only its size can "
+        "be chosen.",
     )
     width_px: Annotated[Width, Strict] = Field(1920, description="Width in pixels, even.")
     height_px: Annotated[Height, Strict] | None = Field(
-        None, description="Height in pixels, even; null: as much as what is shown needs."
+        None, description="Height in pixels, even; null: as high as the content."
     )
     field_of_view_deg: Annotated[FieldOfView, Strict] | None = Field(
         None,
-        description="From the left border to the right one, in degrees; null: the visible pitch. At most 140 of a "
-        "rectilinear view, 270 of pannini and 340 of a cylinder are shown.",
+        description="Angle from the left to the right border, in degrees; null: the visible pitch. At most 140 for a "
+        "rectilinear view, 270 for pannini and 340 for a cylinder.",
     )
-    pan_deg: Annotated[Pan, Strict] = Field(0, description="To the right of where the cameras look, in degrees.")
+    pan_deg: Annotated[Pan, Strict] = Field(
+        0, description="Pan to the right of the cameras' mean direction, in degrees."
+    )
     horizon: Annotated[Horizon, Strict] | None = Field(
         None,
-        description="How far down the horizon lies, in heights of the picture: 0 at its top, 1 at its bottom; it may "
-        "lie outside. null: as it suits what is shown.",
+        description="Height of the horizon from the top, in picture heights: 0 at the top, 1 at the bottom; it may lie "
+        "outside. null: chosen to suit the content.",
     )
 
     def but(self, changes: Mapping[str, Any]) -> ViewChoice:
-        """The same but for some parts."""
+        """Return the settings with some of them changed."""
         return self.model_copy(update=dict(changes))

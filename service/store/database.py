@@ -8,6 +8,7 @@ import sqlite3
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
 from datetime import UTC, datetime
 from functools import partial
 from importlib.metadata import version
@@ -65,6 +66,8 @@ def _parse_json(text: str) -> Any:
         return text
 
 
+# The connection of `snapshot`, for what is read inside it.
+_snapshot: ContextVar[sa.Connection | None] = ContextVar("snapshot", default=None)
 # NaN is none: SQLite would store what neither its own functions nor other programs can read.
 JSON: dict[str, Any] = {"json_serializer": partial(json.dumps, allow_nan=False), "json_deserializer": _parse_json}
 
@@ -180,9 +183,24 @@ def _begin_sqlite(connection: sa.Connection) -> None:
 
 @contextmanager
 def reading(engine: sa.Engine) -> Iterator[sa.Connection]:
-    """A transaction that sees one state of the database and takes no lock."""
+    """A transaction that sees one state of the database and takes no lock; inside `snapshot` it is that one."""
+    shared = _snapshot.get()
+    if shared is not None and shared.engine is engine:
+        yield shared
+        return
     with engine.connect().execution_options(**SNAPSHOT[engine.dialect.name]) as connection, connection.begin():
         yield connection
+
+
+@contextmanager
+def snapshot(engine: sa.Engine) -> Iterator[None]:
+    """Let every `reading` of this engine in the block share one transaction, and so see the same state."""
+    with reading(engine) as connection:
+        token = _snapshot.set(connection)
+        try:
+            yield
+        finally:
+            _snapshot.reset(token)
 
 
 @contextmanager

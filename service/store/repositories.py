@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager
+
 from service.store.adoption import AdoptionRepository
-from service.store.database import connect, migrate
+from service.store.database import connect, migrate, snapshot
 from service.store.events.feed import EventRepository
 from service.store.events.outbox import OutboxRepository
 from service.store.expiry import ExpiryRepository
@@ -47,3 +49,7 @@ class Repositories:
         self.workers = WorkerRepository(engine)
         self.keys = KeyRepository(engine)
         self.sessions = SessionRepository(engine)
+
+    def snapshot(self) -> AbstractContextManager[None]:
+        """Let everything that is read in a `with` block see the same state of the database, in one transaction."""
+        return snapshot(self.engine)

@@ -105,7 +105,7 @@ def keep_one_path(page: Page, kept: str) -> None:
 
 
 def look(part: Page | Locator) -> np.ndarray:
-    """What is to be seen of it, once the pictures inside it have been loaded: BGR."""
+    """Return a screenshot of a page or a part of it (BGR), after the pictures inside have been loaded."""
     if isinstance(part, Locator):
         # Pictures are loaded when they are about to be seen, and those of a layer when it is first switched on.
         part.scroll_into_view_if_needed()
@@ -134,9 +134,9 @@ def in_each_scheme(page: Page) -> Iterator[str]:
 
 
 def grave(page: Page) -> list[str]:
-    """What keeps people with a screen reader, a keyboard or weak eyes from using the page: axe-core's findings.
+    """Return axe-core's serious findings: obstacles for people with a screen reader, a keyboard or weak eyes.
 
-    In light colours and in dark ones, which differ in colours alone: only its rules of those are asked twice.
+    The colour schemes differ in colours alone, so only the rules about colours are checked in both.
     """
     # Evaluated by the debugger: the policy of the page would refuse a script from elsewhere.
     page.evaluate(AXE.read_text())
@@ -154,5 +154,5 @@ def grave(page: Page) -> list[str]:
 
 
 def list_from(venue: str) -> str:
-    """Where the list of venues begins about with this one: other tests have made more than its first page has."""
+    """Return the address of the list of venues from about this venue on: other tests fill its first page."""
     return f"/?after={venue[:-1]}"

@@ -13,6 +13,7 @@ from tests.e2e.running import Service, ready, wait_for
 from tests.once import made_once
 from tests.pages import newcomer
 from tests.pages.browsing import browser_at, chromium, person, tab
+from tests.worker.stock import Stock
 
 # Worker and engine load libraries first.
 STARTING_S = 120
@@ -39,6 +40,14 @@ def stub(tmp_path_factory):
     wait_for(lambda: ready(running.http), STARTING_S)
     yield running
     assert running.stop() == 0
+
+
+@pytest.fixture(scope="package")
+def stored(stub):
+    """The database of that service, for calibrations that need no job to have run."""
+    stock = Stock(stub.data)
+    yield stock
+    stock.engine.dispose()
 
 
 @pytest.fixture(scope="package")

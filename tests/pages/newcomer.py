@@ -15,7 +15,7 @@ from worker.calibration.geometry.camera import Camera
 from worker.jobs.from_schemas import camera_of, pitch_of
 
 DEMO = Path(demo.__file__).parent
-# Of the demo's frames, which are 4K: a quarter of the pixels to read, to send and to draw.
+# The demo's frames are 4K: a quarter of the pixels is enough.
 SCALE = 0.5
 
 
@@ -69,7 +69,7 @@ def finds_the_cameras(page: Page) -> str:
 
 
 def drop_the_frames(page: Page) -> None:
-    """One of each camera: football is what the page begins with, and the files are called as the cameras are to be."""
+    """Choose a frame of each camera. Football is the default, and the files are named like the cameras."""
     page.locator("#frames input[type=file]").set_input_files([frame(camera.id) for camera in VENUE.cameras])
     expect(page.locator(".found-frames canvas")).to_have_count(len(VENUE.cameras))
 

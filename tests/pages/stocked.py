@@ -17,7 +17,7 @@ from tests.worker.stock import result
 
 
 def calibrations(connection: sa.Connection, venue_id: str, count: int) -> None:
-    """So many of them, a quarter of an hour apart; every tenth was rejected."""
+    """Insert `count` calibrations, a quarter of an hour apart; every tenth was rejected."""
     venue: Venue = VenueIn.model_validate(running.venue(venue_id)).to_venue()
     now = datetime.now(UTC)
     rows = []
@@ -85,7 +85,7 @@ LIVE = {
 
 
 def live_minutes(connection: sa.Connection, venue_id: str, count: int) -> None:
-    """So many before the one that goes on, in which the mast of the left camera swayed."""
+    """Insert `count` past minutes of live poses, in which the mast of the left camera swayed."""
     now = datetime.now(UTC).replace(second=0, microsecond=0)
     rows = [
         {

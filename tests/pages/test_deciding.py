@@ -1,4 +1,6 @@
-"""What pages offer can be done, and what cannot be done any more is said in words."""
+"""Decisions about calibrations: pages offer those that are possible, and explain why others are not."""
+
+import re
 
 import pytest
 import sqlalchemy as sa
@@ -7,6 +9,7 @@ from playwright.sync_api import expect
 from service.store import tables
 from tests.e2e.running import venue
 from tests.pages.browsing import press_and_confirm
+from tests.pages.reading import shown_at, words_of
 
 
 def moved_by_hand(stub, name):
@@ -15,18 +18,19 @@ def moved_by_hand(stub, name):
     stub.http.patch(f"/venues/{name}", json={"cameras": {"left": {"pose": pose}}}).raise_for_status()
 
 
-@pytest.mark.parametrize("behaviour", ["accept", "reject", "partly"])
-@pytest.mark.parametrize("path", ["/ui/venues/{venue}", "/ui/jobs/{job}"])
-def test_poses_of_a_venue_that_was_changed_since_are_not_offered_and_the_way_out_is_said(stub, visit, behaviour, path):
-    name = stub.venue(f"changed-{behaviour}", behaviour)
-    job = stub.calibrated(name)["id"]
+ACCEPTED = {"accept": True, "reject": False, "partly": ["left"]}
+
+
+@pytest.mark.parametrize("behaviour", ACCEPTED)
+def test_poses_of_a_venue_that_was_changed_since_are_not_offered_and_the_way_out_is_said(stub, stored, behaviour):
+    name = f"changed-{behaviour}"
+    job = stored.calibrated(name, accepted=ACCEPTED[behaviour])
     moved_by_hand(stub, name)
-    page = visit(stub.url, path.format(venue=name, job=job))
-    expect(page.get_by_text("cannot be accepted any more")).to_be_visible()
-    expect(page.get_by_role("button", name="Accept")).to_have_count(0)
-    expect(page.get_by_role("button", name="Undo")).to_have_count(0)
-    way_out = "Calibrate" if behaviour == "reject" else "Revisions"
-    expect(page.get_by_text("cannot be accepted any more").get_by_role("link", name=way_out)).to_be_visible()
+    for path in (f"/ui/venues/{name}", f"/ui/jobs/{job}"):
+        shown = shown_at(stub, path)
+        (way_out,) = re.findall(r'<span class="dim">The venue was changed since.*?</span>', shown, re.DOTALL)
+        assert re.findall(r"<a [^>]*>(.*?)</a>", way_out) == ["Calibrate" if behaviour == "reject" else "Revisions"]
+        assert decisions_in(shown) == []
 
 
 def test_a_calibration_that_moved_no_camera_offers_nothing_and_speaks_of_no_change_of_the_venue(stub, visit):
@@ -82,32 +86,36 @@ def decide(stub, name, job, steps):
     ],
 )  # fmt: skip
 def test_pages_say_what_became_of_a_calibration_and_offer_what_can_be_decided(
-    stub, visit, behaviour, steps, headline, colour, in_use, buttons
+    stub, stored, behaviour, steps, headline, colour, in_use, buttons
 ):
-    name = stub.venue(f"sequence-{behaviour}-{steps.replace(' ', '-')}", behaviour)
-    job = stub.calibrated(name, dry_run=steps.startswith("dry"))["id"]
+    name, dry_run = f"sequence-{behaviour}-{steps.replace(' ', '-')}", steps.startswith("dry")
+    if behaviour in ACCEPTED:
+        job = stored.calibrated(name, accepted=ACCEPTED[behaviour], dry_run=dry_run)
+    else:
+        job = stub.calibrated(stub.venue(name, behaviour), dry_run=dry_run)["id"]
     decide(stub, name, job, steps.removeprefix("dry"))
-    page = visit(stub.url, f"/ui/venues/{name}")
-    assert_said(page, headline, in_use, buttons)
-    expect(page.locator(".verdict")).to_have_class(f"verdict {colour}")
-    expect(page.locator(".verdict-big")).to_have_text(headline)
-    page.goto(f"/ui/jobs/{job}")
-    assert_said(page, headline, in_use, buttons)
-    expect(page.locator(".title .badge")).to_have_class("badge" if colour == "plain" else f"badge {colour}")
-    expect(page.locator(".title .badge")).to_have_text(headline)
+    of_venue, of_job = shown_at(stub, f"/ui/venues/{name}"), shown_at(stub, f"/ui/jobs/{job}")
+    for shown in (of_venue, of_job):
+        assert in_use in words_of(shown)
+        assert decisions_in(shown) == buttons
+        is_lost = headline != "Accepted" and not buttons
+        assert ("cannot be accepted any more" in shown) == is_lost
+    assert f'<section class="verdict {colour}"' in of_venue
+    assert words_of(re.search(r'<p class="verdict-big">.*?</p>', of_venue, re.DOTALL)[0]) == headline
+    badge = re.search(r'<div class="title">.*?<span class="(badge[^"]*)"[^>]*>(.*?)</span>', of_job, re.DOTALL)
+    assert badge[1].split() == ["badge", *([] if colour == "plain" else [colour])]
+    assert words_of(badge[2]) == headline
 
 
-def assert_said(page, headline, in_use, buttons):
-    expect(page.get_by_text(in_use)).to_be_visible()
-    decisions = page.locator("button[data-call$='/accept'], button[data-call$='/reject']")
-    assert [words.strip() for words in decisions.all_inner_texts()] == buttons
-    is_lost = headline != "Accepted" and not buttons
-    expect(page.get_by_text("cannot be accepted any more")).to_have_count(int(is_lost))
+def decisions_in(shown):
+    """The words of the buttons that accept or reject."""
+    buttons = re.findall(r'<button[^>]* data-call="[^"]*/(?:accept|reject)"[^>]*>(.*?)</button>', shown, re.DOTALL)
+    return [words_of(button) for button in buttons]
 
 
-def test_what_was_restored_away_can_be_had_back_as_the_page_says(stub, visit):
-    name = stub.venue("had-back")
-    stub.calibrated(name)
+def test_what_was_restored_away_can_be_had_back_as_the_page_says(stub, stored, visit):
+    name = "had-back"
+    stored.calibrated(name)
     page = visit(stub.url, f"/ui/venues/{name}")
     press_and_confirm(page.get_by_role("button", name="Restore revision 1"))
     expect(page.get_by_text("In use: revision 3 (poses of revision 1)")).to_be_visible()
@@ -136,9 +144,8 @@ def test_a_ridge_that_the_lines_have_is_stored_after_a_question_that_says_what_c
     assert stub.http.get(f"/venues/{name}").json()["field"]["ridge"] is None
 
 
-def test_a_camera_that_was_accepted_by_hand_is_not_offered_again(stub, visit):
-    name = stub.venue("once", "partly")
-    job = stub.calibrated(name)["id"]
+def test_a_camera_that_was_accepted_by_hand_is_not_offered_again(stub, stored, visit):
+    job = stored.calibrated("once", accepted=["left"])
     page = visit(stub.url, f"/ui/jobs/{job}")
     press_and_confirm(page.get_by_role("button", name="Accept right anyway"))
     expect(page.get_by_text("as revision 3")).to_be_visible()
@@ -153,50 +160,43 @@ def test_a_revision_of_other_cameras_is_not_offered(stub, visit):
     expect(page.get_by_role("button", name="Restore revision 1")).to_have_count(0)
 
 
-def test_a_job_whose_frames_do_not_fit_any_more_is_not_offered_again(stub, visit):
-    name = stub.venue("refitted")
-    job = stub.calibrated(name)["id"]
-    page = visit(stub.url, f"/ui/jobs/{job}")
-    expect(page.get_by_role("button", name="Again")).to_be_visible()
-    stub.http.patch(f"/venues/{name}", json={"field": {"length_m": 100}}).raise_for_status()
-    page.reload()
-    expect(page.get_by_role("heading", level=1)).to_be_visible()
-    expect(page.get_by_role("button", name="Again")).to_have_count(0)
+def test_a_job_whose_frames_do_not_fit_any_more_is_not_offered_again(stub, stored):
+    path = f"/ui/jobs/{stored.calibrated('refitted')}"
+    assert "Again</button>" in shown_at(stub, path)
+    stub.http.patch("/venues/refitted", json={"field": {"length_m": 100}}).raise_for_status()
+    assert "Again</button>" not in shown_at(stub, path)
 
 
-def test_what_was_changed_a_moment_ago_is_said_without_a_word_of_requests(stub, visit):
-    name = stub.venue("raced")
-    job = stub.calibrated(name)["id"]
+def test_what_was_changed_a_moment_ago_is_said_without_a_word_of_requests(stub, stored, visit):
+    job = stored.calibrated("raced")
     page = visit(stub.url, f"/ui/jobs/{job}", forgiven=("409",))
-    moved_by_hand(stub, name)
+    moved_by_hand(stub, "raced")
     press_and_confirm(page.get_by_role("button", name="Undo"))
     said = page.get_by_role("status").filter(has_text="changed since")
     expect(said).to_have_text("The venue has been changed since this job. Load the page again to see how it is now.")
 
 
-def test_a_job_that_was_deleted_is_not_linked_to(stub, visit):
-    name = stub.venue("pruned")
-    job = stub.calibrated(name)["id"]
+def test_a_job_that_was_deleted_is_not_linked_to(stub, stored):
+    job = stored.calibrated("pruned")
     stub.http.delete(f"/jobs/{job}").raise_for_status()
-    page = visit(stub.url, f"/ui/venues/{name}", forgiven=("404",))
-    expect(page.get_by_text("(job deleted)")).to_be_visible()
-    assert page.locator(f"a[href*='{job}']").count() == 0
-    page.goto(f"/ui/jobs/{job}")
-    expect(page.get_by_text("It was deleted: by somebody, or since it ended more than")).to_be_visible()
+    shown = shown_at(stub, "/ui/venues/pruned")
+    assert "(job deleted)" in shown
+    assert not re.search(rf'href="[^"]*{job}', shown)
+    gone = shown_at(stub, f"/ui/jobs/{job}", 404)
+    assert "It was deleted: by somebody, or since it ended more than" in gone
 
 
-@pytest.mark.parametrize("path", ["/ui/venues/alone", "/ui/jobs/{job}"])
-def test_a_stitch_error_that_nobody_could_measure_has_no_length(stub, visit, path):
-    stub.venue("alone")
-    job = stub.calibrated("alone")["id"]
+def test_a_stitch_error_that_nobody_could_measure_has_no_length(stub, stored):
+    job = stored.calibrated("alone")
     with stub.database() as connection:
         of_job = tables.jobs.c.id == job
         result = connection.scalar(sa.select(tables.jobs.c.result).where(of_job))
         unmeasured = result | {"stitch_error_px": None, "stitch_error_before_px": None}
         connection.execute(sa.update(tables.jobs).where(of_job).values(result=unmeasured))
-    page = visit(stub.url, path.format(job=job))
-    expect(page.locator(".keys").get_by_text("not measured")).to_have_count(2)
-    expect(page.locator(".keys").get_by_text("–on the pitch")).to_have_count(0)
+    for path in ("/ui/venues/alone", f"/ui/jobs/{job}"):
+        (keys,) = re.findall(r'<dl class="keys.*?</dl>', shown_at(stub, path), re.DOTALL)
+        assert words_of(keys).count("not measured") == 2
+        assert "–on the pitch" not in words_of(keys)
 
 
 def test_a_knocked_camera_is_accepted_where_it_was_found_by_one_click(stub, visit):

@@ -1,4 +1,4 @@
-"""How pages are laid out: on a phone, of many cameras, and before their pictures are there."""
+"""Layout of pages: on a phone, of many cameras, and before their pictures are loaded."""
 
 import itertools
 
@@ -10,7 +10,6 @@ from tests.pages.browsing import tab, wait_until
 from tests.pages.newcomer import describe_a_camera
 
 PHONE = {"width": 390, "height": 844}
-MANY = ("a", "b", "c", "d", "e", "f")
 
 
 @pytest.fixture
@@ -21,14 +20,14 @@ def phone(stub, people):
 
 
 def inside(page, part):
-    """Whether somebody sees all of it without scrolling anything sideways."""
+    """True if all of a part is visible without scrolling sideways."""
     box = part.bounding_box()
     return box["x"] >= 0 and box["x"] + box["width"] <= PHONE["width"]
 
 
-def test_a_phone_shows_all_of_each_row_with_what_it_is(stub, phone):
-    name = stub.venue("small")
-    job = stub.calibrated(name)["id"]
+def test_a_phone_shows_all_of_each_row_with_what_it_is(stored, phone):
+    name = "small"
+    job = stored.calibrated(name)
     phone.goto(f"/ui/venues/{name}")
     for section in ("Revisions of the poses", "Download the poses in use"):
         phone.locator("summary", has_text=section).click()
@@ -44,9 +43,9 @@ def test_a_phone_shows_all_of_each_row_with_what_it_is(stub, phone):
     assert all(inside(phone, cell) for cell in phone.locator("tbody td").all())
 
 
-def test_a_phone_folds_what_is_not_needed_first_and_the_address_opens_it(stub, phone):
-    name = stub.venue("folded")
-    stub.calibrated(name)
+def test_a_phone_folds_what_is_not_needed_first_and_the_address_opens_it(stored, phone):
+    name = "folded"
+    stored.calibrated(name)
     phone.goto(f"/ui/venues/{name}")
     restore, cron = phone.get_by_role("button", name="Restore revision 1"), phone.get_by_label("Cron schedule")
     for hidden in (restore, cron):
@@ -64,12 +63,12 @@ def test_a_phone_folds_what_is_not_needed_first_and_the_address_opens_it(stub, p
     expect(restore).to_be_hidden()
 
 
-def test_what_a_phone_has_folded_stays_folded_while_the_page_follows_what_happens(stub, phone):
-    name = stub.venue("followed")
-    stub.calibrated(name)
+def test_what_a_phone_has_folded_stays_folded_while_the_page_follows_what_happens(stored, phone):
+    name = "unfolded"
+    stored.calibrated(name)
     phone.goto(f"/ui/venues/{name}")
     phone.locator("summary", has_text="Download the poses in use").click()
-    stub.calibrated(name, shade=1)
+    stored.calibrated(name)
     expect(phone.locator("[data-part=history] tbody tr:has(.badge)")).to_have_count(2)
     expect(phone.get_by_role("button", name="Restore revision 1")).to_be_hidden()
     expect(phone.get_by_role("link", name="opencv, camera right")).to_be_visible()

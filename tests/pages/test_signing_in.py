@@ -17,7 +17,7 @@ def guarded(tmp_path_factory):
     folder = tmp_path_factory.mktemp("guarded")
     store = keys_in(folder)
     keys = {scope: store.add(scope, scope) for scope in ("read", "calibrate", "admin")}
-    running = Service(folder)
+    running = Service(folder, "serve")
     admin = {"Authorization": f"Bearer {keys['admin']}"}
     wait_for(lambda: running.http.put("/venues/field", json=venue("field"), headers=admin).status_code < 300)
     yield running, keys

@@ -1,4 +1,4 @@
-"""How soon something is to be seen."""
+"""Time until a page is painted."""
 
 import pytest
 
@@ -26,7 +26,7 @@ def test_a_venue_with_a_thousand_jobs_is_painted_within_a_second(stub, years, vi
 
 
 def first_paint_ms(page):
-    """Of the page, loaded anew: a busy machine may be late now and then."""
+    """Reload the page and return the time of its first paint: a busy machine may be late now and then."""
     page.reload()
     page.locator("#chart canvas").wait_for()
     return page.evaluate("performance.getEntriesByName('first-contentful-paint')[0].startTime")

@@ -27,7 +27,7 @@ def pitch(stub):
 
 
 def settled(page):
-    """What the picture shows once it shows what was chosen."""
+    """Return a screenshot of the picture after it shows the chosen view."""
     page.wait_for_timeout(300)
     wait_until(page, "document.getElementById('view-picture').ariaBusy === 'false'")
     return look(page.locator("#view-picture"))

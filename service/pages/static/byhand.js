@@ -1,4 +1,4 @@
-// The way to a first calibration by clicks. What is gathered stays here until the venue is created.
+// A new venue by hand, with clicked first poses. Its data stay in the browser until the venue is created.
 
 import {call, Refused, root, signed} from "./page.js";
 import {missingOfPitch, pitch, pitchForm, readForm} from "./pitch.js";
@@ -16,7 +16,7 @@ function changed() {
   tell();
 }
 
-/** What is still to be done. */
+/** Returns the steps that are still missing. */
 function tell() {
   const open = missingOfPitch();
   if (!cameras.length) open.push("a camera");

@@ -1,18 +1,18 @@
-// The stitched view before and after: slider, seam, and a magnifier that goes along it.
+// Comparison of the stitched view before and after: slider, seam, and a magnifier along the seam.
 
 import {whenShown} from "./parts.js";
 
 const STEP = 5;
 const REACH = 40;
 const SHORTEST = 20;
-/** How far around a place of the seam a line is looked for, at each how many places, the noise of
- * even ground, and by which share grounds of one field differ. */
+/** Search for a line around a place of the seam: its reach, the step between places, the noise of
+ * even ground, and the share by which grounds of one field differ. */
 const WINDOW = 12;
 const EACH = 4;
 const EVEN = 8;
 const ALIKE = 0.4;
 
-/** The slider of the library moves; what screen readers hear and how keys work is said here. */
+/** Accessibility of the library's slider: its role for screen readers, and its keys. */
 function speak(slider) {
   const value = Math.round(slider.value);
   slider.setAttribute("aria-valuenow", value);
@@ -27,7 +27,7 @@ function onKey(event, slider) {
   speak(slider);
 }
 
-/** Places along the seam, in pixels of the view: of each handover from its bottom to its top. */
+/** Places along the seam, in pixels of the view, from bottom to top for each pair of cameras. */
 function alongTheSeam(image) {
   const canvas = new OffscreenCanvas(image.naturalWidth, image.naturalHeight);
   const context = canvas.getContext("2d", {willReadFrequently: true});
@@ -45,7 +45,7 @@ function alongTheSeam(image) {
   return chains.filter((chain) => chain.length >= SHORTEST).flat();
 }
 
-/** The value below which this share of some values lies. */
+/** The quantile of some values. */
 function quantile(values, share) {
   return [...values].sort((one, other) => one - other)[Math.floor(share * (values.length - 1))];
 }
@@ -63,7 +63,7 @@ function onALine(image, seam) {
     place.ground = quantile(greys, 0.5);
     place.like = (quantile(greys, 0.97) - place.ground) / (EVEN + quantile(greys, 0.75) - quantile(greys, 0.25));
   }
-  // What lies beyond the field is high up in a view.
+  // Places outside the field are high up in the view.
   const below = places.filter(({y}) => y > image.naturalHeight / 2).map(({ground}) => ground);
   const usual = quantile(below.length ? below : places.map(({ground}) => ground), 0.5);
   const onTheField = places.filter(({ground}) => Math.abs(ground - usual) < ALIKE * usual);

@@ -1,4 +1,4 @@
-// New first poses of a venue that is there: of those of its cameras that a frame is chosen of.
+// New first poses of a stored venue, for the cameras that get a frame.
 
 import {call, root} from "./page.js";
 import {Camera, common} from "./posing.js";
@@ -8,7 +8,7 @@ const venue = JSON.parse(box.dataset.venue);
 const storeButton = document.getElementById("store");
 const missing = document.getElementById("missing");
 
-/** A camera of the venue, with the lens that it has. */
+/** A camera of the venue with its stored lens. */
 function asStored({id, image_size: size, intrinsics}) {
   const camera = new Camera(id);
   camera.field("id").readOnly = true;
@@ -19,7 +19,7 @@ function asStored({id, image_size: size, intrinsics}) {
   return camera;
 }
 
-/** What is changed of a camera: its pose, and its lens where somebody or the points have corrected that. */
+/** The changes of a camera: its pose, and its lens if somebody or the points have corrected it. */
 function patch(camera) {
   const {rotation, position} = camera.result.pose;
   const isCorrected = camera.result.lens || JSON.stringify(camera.intrinsics) !== camera.lensAsStored;

@@ -1,4 +1,4 @@
-// Pages that follow what happens: that of a venue by its events, lists by asking again.
+// Pages that update themselves: a venue by its events, lists by polling.
 
 import {refresh} from "./parts.js";
 import {listen} from "./stream.js";
@@ -15,7 +15,7 @@ function followVenue() {
   let {seen} = box.dataset;
   let timer = 0;
   const happened = ({lastEventId}) => {
-    // How a stream begins is an event as well, of what the page shows already.
+    // The first event of a stream has the state that the page already shows.
     if (lastEventId === seen) return;
     seen = lastEventId;
     clearTimeout(timer);

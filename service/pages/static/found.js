@@ -1,4 +1,4 @@
-// What a search found: a candidate of each camera is chosen by a click, and all of them are taken by another.
+// Result of a search for cameras: choose a candidate of each camera, and store all of them.
 
 import {call, root} from "./page.js";
 
@@ -6,7 +6,7 @@ const form = document.getElementById("found");
 const button = form?.querySelector("button[type=submit]");
 const cameras = [...(form?.querySelectorAll("[data-camera]") || [])].map((section) => section.dataset.camera);
 
-/** The candidate that was chosen of a camera: its number, null for none of them, undefined where it is open. */
+/** Number of the chosen candidate of a camera; null for none of them, undefined without a choice. */
 function chosen(camera) {
   const radio = form.querySelector(`input[name="${camera}"]:checked`);
   if (!radio) return undefined;
@@ -21,7 +21,7 @@ function tell() {
   form.querySelector("[data-open]").textContent = words;
 }
 
-/** Let the cameras stand half a turn about the field's centre away, as their second candidates do, or back again. */
+/** Swap the sides of the cameras, half a turn about the field's centre: choose their other candidates. */
 function swap(event) {
   const wasSwapped = event.currentTarget.getAttribute("aria-pressed") === "true";
   event.currentTarget.setAttribute("aria-pressed", !wasSwapped);

@@ -1,4 +1,4 @@
-// Forms that send frames: for each camera, or for some, looked at here, sent with their progress shown.
+// Forms that upload frames of all or some cameras, with checks before and progress during the upload.
 
 import {root, signed} from "./page.js";
 import {objection, thumbnail} from "./frames.js";
@@ -27,7 +27,7 @@ class Drop {
     });
   }
 
-  /** Whatever the input has by now: on a slow line, files are chosen before this script has come. */
+  /** Take the files that the input has by now: on a slow connection they are chosen before this script is loaded. */
   take() {
     if (this.input.files.length === 0) return;
     this.add([...this.input.files]);
@@ -76,7 +76,7 @@ class Drop {
 const drops = [...form.querySelectorAll(".drop")].map((box) => new Drop(box));
 for (const drop of drops) drop.take();
 
-/** What still has to be chosen. */
+/** Returns the cameras that still need a frame. */
 function tell() {
   const without = drops.filter((drop) => drop.files.length === 0).map((drop) => drop.camera);
   const isEnough = "some" in form.dataset ? without.length < drops.length : without.length === 0;
@@ -84,7 +84,7 @@ function tell() {
   missing.textContent = isEnough ? "" : `No frame yet of ${without.join(", ")}`;
 }
 
-/** What was chosen, as the interface takes it; what was left open is not sent. */
+/** The options for the interface; unset ones are left out. */
 function options() {
   const chosen = {};
   for (const field of form.querySelectorAll(".options [name]")) {
@@ -107,7 +107,7 @@ function send(event) {
   const body = new FormData();
   for (const drop of drops) for (const file of drop.files) body.append(drop.camera, file);
   body.append("options", JSON.stringify(options()));
-  // Unlike fetch, it tells how much has been sent.
+  // Unlike fetch, it reports the progress of an upload.
   const request = new XMLHttpRequest();
   request.open("POST", form.dataset.address);
   for (const [name, value] of Object.entries(signed)) request.setRequestHeader(name, value);

@@ -1,13 +1,13 @@
-// Frames that somebody chose: shown small, and looked at before they travel.
+// Chosen frames: thumbnails, and checks before the upload.
 
 const THUMB = 320;
 const JPEG = {start: 0xffd8, exif: 0xe1, name: 0x45786966, scan: 0xda, padding: 0xff};
 const PNG = {signature: 8, exif: 0x65584966, around: 12};
 
-/** Draw a picture as its pixels are stored, however its camera was held: the service takes them so as well.
+/** Draw a picture as its pixels are stored, without the rotation of its Exif data: the service ignores that as well.
  *
- * Exif says how that was, and is left out of what is decoded: browsers differ in `imageOrientation: "none"`, which
- * Chromium takes for "from-image" since 2025.
+ * Exif is cut out before decoding, since browsers differ in `imageOrientation: "none"`, which Chromium treats like
+ * "from-image" since 2025.
  */
 export async function pictureOf(file, options) {
   const bytes = await file.arrayBuffer();
@@ -22,7 +22,7 @@ export async function pictureOf(file, options) {
   return createImageBitmap(new Blob([...kept, bytes.slice(from)], {type: file.type}), options);
 }
 
-/** Where Exif stands among the segments before the picture itself; each begins with a marker and its length. */
+/** Position of Exif among the segments before the picture data; each begins with a marker and its length. */
 function* exifOfJpeg(view) {
   for (let at = 2; at + 8 <= view.byteLength && view.getUint8(at) === 0xff;) {
     const marker = view.getUint8(at + 1);
@@ -33,7 +33,7 @@ function* exifOfJpeg(view) {
   }
 }
 
-/** Where Exif stands among the chunks, each with its length and its type before and a checksum behind. */
+/** Position of Exif among the chunks: each is length, type, data and checksum. */
 function* exifOfPng(view) {
   for (let at = PNG.signature; at + PNG.around <= view.byteLength;) {
     const end = at + PNG.around + view.getUint32(at);
@@ -42,7 +42,7 @@ function* exifOfPng(view) {
   }
 }
 
-/** Width and height of a picture as it is stored. */
+/** Width and height of the stored pixels of a picture. */
 export async function sizeOf(file) {
   const picture = await pictureOf(file);
   const size = [picture.width, picture.height];
@@ -50,7 +50,7 @@ export async function sizeOf(file) {
   return size;
 }
 
-/** A small picture of a file. */
+/** A thumbnail of a file. */
 export async function thumbnail(file) {
   const picture = await pictureOf(file, {resizeWidth: THUMB, resizeQuality: "medium"});
   const canvas = document.createElement("canvas");
@@ -63,7 +63,7 @@ export async function thumbnail(file) {
   return canvas;
 }
 
-/** Why a file cannot be a frame of this size; null: it can. */
+/** The reason why a file cannot be a frame of this size; null: it can. */
 export async function objection(file, [width, height], most) {
   if (!["image/jpeg", "image/png"].includes(file.type)) return `${file.name} is neither a JPEG nor a PNG.`;
   if (file.size > most) return `${file.name} has ${(file.size / 1e6).toFixed(1)} MB; ${(most / 1e6).toFixed(0)} MB are allowed.`;

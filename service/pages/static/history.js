@@ -1,4 +1,4 @@
-// Stitch error and movement of a venue over time, with the line of the gate.
+// Chart of the stitch error and the movements of a venue over time, with the limit of the gate.
 
 import {CLOCK, axis, fill} from "./chart.js";
 import {call, onScheme, say, styled} from "./page.js";
@@ -13,11 +13,11 @@ function px(plot, value) {
 
 function draw(place, history, isLogarithmic) {
   place.replaceChildren();
-  // Of a single moment, some time before and after it.
+  // A single moment gets an hour before and after it.
   const around = (plot, first, last) => (history.at.length === 1 ? [history.at[0] - HOUR, history.at[0] + HOUR] : [first, last]);
   const limit = history.stitch_error_limit_px;
   const cameras = Object.keys(history.moved_px);
-  // Nothing has a logarithm of zero.
+  // Zero has no logarithm.
   const shown = (values) => (isLogarithmic ? values.map((value) => (value ? value : null)) : values);
   const data = [history.at, shown(history.stitch_error_px), history.at.map(() => limit), ...cameras.map((camera) => shown(history.moved_px[camera]))];
   const points = {show: history.at.length < 80, size: 6};

@@ -1,11 +1,11 @@
-// Areas of each camera's frame that are to be ignored: drawn corner by corner, saved as a part of the venue.
+// Ignored areas of each camera's frame: drawn corner by corner, saved with the venue.
 
 import {pictureOf} from "./frames.js";
 import {call, root} from "./page.js";
 
 const SVG = "http://www.w3.org/2000/svg";
 const WIDEST = 1920;
-/** On the screen, from the first corner: a click so near closes an area. */
+/** Distance from the first corner, in screen pixels, within which a click closes an area. */
 const CLOSING = 12;
 const FEWEST = 3;
 const venue = document.getElementById("ignored").dataset.venue;
@@ -53,7 +53,7 @@ class Areas {
 
   say(words) { this.box.querySelector("[data-said]").textContent = words; }
 
-  /** Where in the frame, whose pixel centres are at integers. */
+  /** Position in the frame, whose pixel centres are at integers. */
   pixel(event) {
     const rect = this.canvas.getBoundingClientRect();
     const place = (value, start, extent, size) => ((value - start) / extent) * size - 0.5;

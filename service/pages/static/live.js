@@ -1,4 +1,4 @@
-// A job that is going on: its events move the bar, the stages and the curve of its loss; its end shows the page anew.
+// A running job: its events update progress bar, stages and loss curve; its end reloads the page.
 
 import {axis, fill} from "./chart.js";
 import {loadAgain, onScheme, styled} from "./page.js";
@@ -35,7 +35,7 @@ class Live {
     const {progress} = job;
     showStatus(job);
     const place = job.queue_position ? `, place ${job.queue_position}` : "";
-    // See the macro of this name in parts.html.
+    // As in the macro `stage` of parts.html.
     const stage = job.kind === "find" && progress?.stage === "evolution" ? "search" : progress?.stage;
     const said = progress ? stage + remaining(progress) : LEGENDS[job.status] + place;
     if (this.part("stage").textContent !== said) this.part("stage").textContent = said;
@@ -76,14 +76,14 @@ class Live {
   }
 }
 
-/** How long it will still take, where there is an estimate. */
+/** The estimated remaining time, in words; empty without an estimate. */
 function remaining({expected_end: end}) {
   if (!end) return "";
   const minutes = Math.ceil((new Date(end) - Date.now()) / 60_000);
   return minutes > 0 ? `, about ${minutes} min left` : ", takes longer than expected";
 }
 
-/** Every badge of a job says the same. */
+/** Update every badge of a job. */
 function showStatus({id, status}) {
   for (const badge of document.querySelectorAll(`[data-status-of="${id}"]`)) {
     const icon = badge.querySelector("use");

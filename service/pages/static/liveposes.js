@@ -1,4 +1,4 @@
-// The card of live poses: each report of their process moves its figures, and each minute its curves.
+// Live poses of a venue: each report updates the figures, and each minute the curves.
 
 import {ago} from "./page.js";
 import {refresh, whenShown} from "./parts.js";
@@ -7,7 +7,7 @@ import {listen} from "./stream.js";
 const A_MINUTE = 60000;
 const NONE = "–";
 
-/** Change what a part of the card says, unless it says so already. */
+/** Change the text of an element, unless it has it already. */
 function tell(row, part, words) {
   const place = row.querySelector(`[data-${part}]`);
   if (place.textContent !== words) place.textContent = words;
@@ -28,7 +28,7 @@ function showCamera(row, camera, isRunning) {
 function show(box, state) {
   const rows = rowsOf(box);
   if (rows.map((row) => row.dataset.camera).join() !== state.cameras.map(({id}) => id).join()) return refresh();
-  // Above the pictures while poses are sent, below them afterwards.
+  // The panel is above the pictures while poses are sent, and below them afterwards.
   if (box.querySelector("[data-running]").hidden === state.running) return refresh();
   tell(box, "host", state.host);
   tell(box, "destinations", state.destinations.join(", "));

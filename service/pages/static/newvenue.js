@@ -1,4 +1,4 @@
-// A new venue by its sport and a frame of each camera: sent to be found, and shown as the job that finds them.
+// A new venue by its sport and a frame of each camera: submits a search for the cameras.
 
 import {call, root} from "./page.js";
 import {objection, sizeOf, thumbnail} from "./frames.js";
@@ -14,7 +14,7 @@ const refused = document.getElementById("refused");
 const most = Number(box.dataset.bytes);
 const cameras = [];
 
-/** What a file is called, as the id of a camera that no other one has. */
+/** An unused camera id after the name of a file. */
 function idOf(file) {
   const known = cameras.map((camera) => camera.id);
   const named = idLike(file.name.replace(/\.[a-z]+$/i, "")).slice(0, 60);
@@ -24,7 +24,7 @@ function idOf(file) {
   return id;
 }
 
-/** A camera of which there is a frame, and what is said of it. */
+/** A camera with a frame, and the hints about it. */
 class Camera {
   constructor(file) {
     this.file = file;
@@ -42,7 +42,7 @@ class Camera {
 
   get id() { return this.field("camera").value; }
 
-  /** As the interface takes it; what was left open is not sent. */
+  /** The camera for the interface; unset hints are left out. */
   get wire() {
     const view = number(this.field("view").value);
     const side = this.field("side").value;
@@ -67,7 +67,7 @@ async function add(files) {
   tell();
 }
 
-/** What is still to be done. */
+/** Returns the steps that are still missing. */
 function tell() {
   const open = missingOfPitch();
   if (!cameras.length) open.push("a frame");
@@ -82,7 +82,7 @@ async function find() {
   button.disabled = refused.hidden = true;
   missing.textContent = "Sending the frames …";
   try {
-    // Searches of several pages that were given the same proposal would void each other.
+    // Another page may have used the proposed id since, and two searches for one venue would conflict.
     if (proposed.value === proposed.defaultValue) proposed.value = proposed.defaultValue = (await call("GET", `${root}/ui/new-venue/free`)).id;
     const job = await call("POST", `${root}/venues/${proposed.value}/find`, upload(proposed.value));
     location.assign(`${root}/ui/jobs/${job.id}`);
@@ -93,7 +93,7 @@ async function find() {
   }
 }
 
-/** The site and its frames, as the interface takes them. */
+/** The request: the site and its frames. */
 function upload(id) {
   const site = {id, name: pitchForm.elements.name.value, field: pitch.plan.field, cameras: cameras.map((camera) => camera.wire)};
   const body = new FormData();
@@ -102,7 +102,7 @@ function upload(id) {
   return body;
 }
 
-/** Whatever the input has by now: on a slow line, files are chosen before this script has come. */
+/** Take the files that the input has by now: on a slow connection they are chosen before this script is loaded. */
 function take() {
   if (input.files.length === 0) return;
   add([...input.files]);

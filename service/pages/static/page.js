@@ -1,12 +1,12 @@
-// What every page does: times that stay right, and buttons that call the interface.
+// Code of every page: relative times, and buttons that call the interface.
 
 const token = document.querySelector('meta[name="token"]').content;
-/** The path of another site below which this one is; empty: none. */
+/** Root path of the service behind a proxy; empty: none. */
 export const {root} = document.documentElement.dataset;
 const OFTEN = 5000;
 let leftAt = -Infinity;
 
-// What the interface says to programs by its own addresses, for who has the page before them.
+// Problems of the interface in words for people.
 const IN_WORDS = {
   "venue-moved-on": "The venue has been changed since this job. Load the page again to see how it is now.",
   "venue-changed": "Somebody has changed the venue meanwhile. Load the page again.",
@@ -19,7 +19,7 @@ const IN_WORDS = {
 };
 const OF_PROGRAMS = /\b(GET|PUT|POST|PATCH|DELETE) \//;
 
-/** What a problem says to somebody before the page: sentences that speak of requests are left out. */
+/** The detail of a problem without sentences about HTTP requests. */
 export function inWords(problem) {
   const known = IN_WORDS[(problem.type || "").split("/").at(-1)];
   if (known) return known;
@@ -28,7 +28,7 @@ export function inWords(problem) {
   return said.join(" ") || problem.title;
 }
 
-/** What stands in the way of a call, as the service says it. */
+/** Error of a call, with the problem of the answer. */
 export class Refused extends Error {
   constructor(problem, status) {
     super(inWords(problem) || `The service answered ${status}.`);
@@ -37,7 +37,7 @@ export class Refused extends Error {
   }
 }
 
-/** A message in which the fields of a form are called as the form calls them: "Length, m" and not "field.length_m". */
+/** A message with the labels of form fields in place of their names: "Length, m" and not "field.length_m". */
 export function asLabelled(form, message) {
   let words = message;
   for (const {name, labels} of form.elements) {
@@ -47,10 +47,10 @@ export function asLabelled(form, message) {
   return words;
 }
 
-/** Headers that a page of a session sends with what it changes. */
+/** Headers of requests that change something: the CSRF token of the session. */
 export const signed = token ? {"X-CSRF-Token": token} : {};
 
-/** Call the interface; returns the JSON of the answer, null without a body. `more`: headers. */
+/** Call the interface and return the JSON of the answer, null without a body. `more`: headers. */
 export async function call(method, address, content, more = {}) {
   const body = content === undefined || content instanceof FormData ? content : JSON.stringify(content);
   const type = method === "PATCH" ? "application/merge-patch+json" : "application/json";
@@ -67,19 +67,19 @@ export async function call(method, address, content, more = {}) {
   return json;
 }
 
-/** Say something that has no place of its own on the page. */
+/** Show a message in the status line of the page. */
 export function say(text, bad = false) {
   const place = document.getElementById("says");
   place.textContent = text;
   place.classList.toggle("bad", bad);
 }
 
-/** A colour, or another property, of the style that is in force. */
+/** The current value of a CSS variable, such as a colour. */
 export function styled(name) {
   return getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 }
 
-/** Draw again when the page turns dark or light, until the signal is aborted. */
+/** Redraw when the colour scheme changes, until the signal is aborted. */
 export function onScheme(draw, signal) {
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw, {signal});
 }
@@ -91,10 +91,10 @@ export function ago(moment, now = Date.now()) {
   return `${Math.round(seconds / length)} ${unit} ago`;
 }
 
-/** A moment by the clock where the viewer is: 2026-11-21 11:00:09 GMT+1. */
+/** A moment in the viewer's time zone: 2026-11-21 11:00:09 GMT+1. */
 export function onTheClock(moment) {
   const zone = new Intl.DateTimeFormat("en", {timeZoneName: "short"}).formatToParts(moment);
-  // Swedish is written as ISO 8601 is.
+  // The Swedish locale writes dates like ISO 8601.
   return `${moment.toLocaleString("sv")} ${zone.find(({type}) => type === "timeZoneName").value}`;
 }
 
@@ -107,13 +107,13 @@ export function tellTimes() {
   }
 }
 
-/** Load the page again because something happened, though not just after a click on a link, which would be lost. */
+/** Reload the page, but not right after a click on a link, which would be lost. */
 export function loadAgain() {
   if (performance.now() - leftAt < OFTEN) setTimeout(loadAgain, OFTEN);
   else location.reload();
 }
 
-/** Ask before something happens, and say what will; true: it shall. `does`: what the button says that lets it. */
+/** Ask for confirmation in a dialog; resolves to true if confirmed. `does`: label of the confirming button. */
 export function ask({asks, effect, does, refrain = "Cancel", isDanger = false}) {
   const box = document.createElement("dialog");
   const [question, words, form] = [["h2", asks], ["p", effect], ["form", ""]].map(([tag, text]) => Object.assign(document.createElement(tag), {textContent: text}));

@@ -1,4 +1,4 @@
-// Parts of a page that follow what happens: fetched anew, and replaced where the service says something else of them.
+// Parts of a page that update themselves: fetched again, and replaced if they have changed.
 
 import {loadAgain, say, tellTimes} from "./page.js";
 
@@ -14,9 +14,9 @@ function parts(page = document) {
   return [...page.querySelectorAll("[data-part]")];
 }
 
-/** Call `act(root, signal)` for what the page shows, and again for each part that takes the place of another.
+/** Call `act(root, signal)` for every part of the page, and for each part that replaces another.
  *
- * The signal is aborted when the part goes: streams and listeners outside of it end with it.
+ * The signal is aborted when the part is replaced, to end its streams and its listeners outside of it.
  */
 export function whenShown(act) {
   acts.push(act);
@@ -29,7 +29,7 @@ function signalOf(part) {
   return ends.get(part).signal;
 }
 
-/** Whether somebody has begun to fill in a form of a part: that would be lost. */
+/** True if somebody has begun to fill in a form of a part, which a replacement would lose. */
 function isEdited(part) {
   return [...part.querySelectorAll("form :is(input, select, textarea)")].some((field) => {
     if (field.type === "checkbox" || field.type === "radio") return field.checked !== field.defaultChecked;
@@ -39,7 +39,7 @@ function isEdited(part) {
   });
 }
 
-/** Puts the switches, the opened details and the focus of a part into the one that takes its place. */
+/** Copy the switches, opened details and focus of a part into its replacement. */
 function takeOver(before, after) {
   const known = (part) => [...part.querySelectorAll("input, select")].filter((field) => !field.form && (field.id || field.name));
   for (const field of known(before)) {
@@ -64,7 +64,7 @@ function replace(part, other) {
 
 async function fetchAndReplace() {
   const answer = await fetch(location.href).catch(() => null);
-  // Whoever is signed out meanwhile, or looks at what was deleted, is shown so.
+  // After the end of the session, or a deletion, reload the page to show it.
   if (answer && (answer.redirected || answer.status === 404)) return loadAgain();
   if (!answer || !answer.ok) return say(AWAY, true);
   if (document.getElementById("says").textContent === AWAY) say("");
@@ -77,13 +77,13 @@ async function fetchAndReplace() {
     else replace(part, other);
   }
   const [seen, now] = [document, there].map((page) => page.querySelector("[data-tag]"));
-  // Who changes the venue changes the one that this page shows: of a form that was kept back, the one before.
+  // The ETag for changes stays that of the venue that a kept form shows.
   if (seen && now && isWhole) seen.dataset.tag = now.dataset.tag;
   tellTimes();
   return null;
 }
 
-/** Show the page as the service has it now; what is asked for meanwhile is asked for once more. */
+/** Update all parts of the page; calls during an update start one more. */
 export async function refresh() {
   askAgain = Boolean(asking);
   if (asking) return asking;

@@ -1,14 +1,14 @@
-// The pitch of a new venue: its id, its sport and its measures, looked at as they are typed.
+// The pitch of a new venue: its id, sport and dimensions, checked while typing.
 
 import {asLabelled, call, root} from "./page.js";
 import {complain, drawPlan, later, number} from "./steps.js";
 
 export const pitchForm = document.getElementById("pitch");
 
-/** What the form says: `plan` is the pitch from above, null where there is none like that. */
+/** State of the form; `plan`: the pitch from above, null for invalid input. */
 export const pitch = {plan: null, isTaken: false};
 
-/** The field as it was typed, as the interface takes it. */
+/** The field for the interface. */
 function fieldAsTyped() {
   const value = (name) => number(pitchForm.elements[name].value);
   const field = {template: pitchForm.elements.template.value};
@@ -37,7 +37,7 @@ async function readPitch(changed) {
   return changed();
 }
 
-/** Say at once that an id is another venue's, and not after all the work. */
+/** Warn at once about an id that another venue has. */
 async function readId(changed) {
   const {id} = pitchForm.elements;
   const place = document.getElementById("taken");
@@ -50,7 +50,7 @@ async function readId(changed) {
   changed();
 }
 
-/** What is still to be said of the pitch. */
+/** Returns the missing input about the pitch. */
 export function missingOfPitch() {
   const open = [];
   const {id} = pitchForm.elements;
@@ -60,7 +60,7 @@ export function missingOfPitch() {
   return open;
 }
 
-/** Call `changed()` whenever the form says something else, and once when it was read first. */
+/** Call `changed()` after each change of the form, and once at the beginning. */
 export function readForm(changed) {
   pitchForm.addEventListener("input", later(() => readPitch(changed)));
   pitchForm.elements.id.addEventListener("input", later(() => readId(changed).catch(() => {})));

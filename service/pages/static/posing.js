@@ -1,4 +1,4 @@
-// Cameras whose first pose is found by clicking points of the pitch in a frame.
+// Cameras whose first pose is found from points of the pitch that are clicked in a frame.
 
 import {call, Refused, root} from "./page.js";
 import {objection, sizeOf} from "./frames.js";
@@ -7,15 +7,15 @@ import {complain, drawPlan, later, number} from "./steps.js";
 
 const FEWEST = 4;
 const PAUSE = 250;
-// Shares of the length of the pitch.
+// Sizes as shares of the length of the pitch.
 const LARGEST_POINT = 0.014;
 const SMALLEST_POINT = 0.006;
 const most = Number(document.getElementById("limits").dataset.bytes);
 
-/** What the cameras of a page have in common: the plan of their pitch, and who is told that one of them has changed. */
+/** Shared state of the cameras of a page: the plan of their pitch, and the callback after a change. */
 export const common = {plan: null, cameras: [], tell() {}};
 
-/** How large points of the plan may be, so that no two of them touch where that leaves anything to be seen. */
+/** Radius of the points of the plan: as large as possible without touching, but not invisible. */
 function pointRadius() {
   const places = Object.values(common.plan.points);
   let nearest = Infinity;
@@ -69,7 +69,7 @@ export class Camera {
     const askLater = later(() => this.ask());
     for (const name of ["model", "fx", "fy", "cx", "cy", "distortion"]) {
       this.field(name).addEventListener("input", () => {
-        // What photos say of their lens does not hold for one that was typed in.
+        // The uncertainty from photos does not hold for a lens that is typed in.
         this.sigma = null;
         askLater();
       });
@@ -108,7 +108,7 @@ export class Camera {
     this.one("[data-lens]").hidden = false;
     this.offerPoints();
     await this.sighting.show(file, size);
-    // Not before the frame has its size: a click on the way would be of another place.
+    // Only after the frame has its size: an earlier click would be at another place.
     this.one("[data-clicking]").hidden = false;
     this.ask();
   }
@@ -172,7 +172,7 @@ export class Camera {
     }
   }
 
-  /** The point of the plan that is nearest to the pointer, however small it is drawn. */
+  /** The point of the plan nearest to the pointer. */
   nearest(event) {
     const at = new DOMPoint(event.clientX, event.clientY).matrixTransform(this.one("[data-plan]").getScreenCTM().inverse());
     const far = ([, [x, y]]) => Math.hypot(x - at.x, -y - at.y);
@@ -199,7 +199,7 @@ export class Camera {
     this.ask();
   }
 
-  /** Ask for the pose; of several changes while one is being computed the last is asked about. */
+  /** Request the pose; while one is being computed, only the last change is requested next. */
   async ask() {
     this.result = null;
     common.tell();
@@ -272,7 +272,7 @@ export class Camera {
     this.one(".clicks tbody").replaceChildren(...rows);
   }
 
-  /** The camera as the interface takes it. */
+  /** The camera for the interface. */
   get wire() {
     const {intrinsics, pose} = this.result;
     return {id: this.id, image_size: this.size, intrinsics, pose: {rotation: pose.rotation, position: pose.position}};
@@ -285,7 +285,7 @@ function residual(point) {
   return point.residual_px === null ? "out of sight" : `${point.residual_px.toFixed(1)} px${doubt}`;
 }
 
-/** A job once it has ended; tells meanwhile how far it is. */
+/** Wait for the end of a job, with reports of its progress. */
 function ended(job, told) {
   return new Promise((resolve, reject) => {
     const events = new EventSource(`${root}${job.links.events}`);

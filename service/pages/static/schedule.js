@@ -1,9 +1,9 @@
-// The schedule of a venue: saved with the sources that it needs, and tried.
+// The schedule of a venue: saving it with the sources that it needs, and trying it.
 
 import {call, root, say} from "./page.js";
 import {whenShown} from "./parts.js";
 
-/** What the form changes of the venue; options of the schedule stay as they are. */
+/** The changes of the venue by the form; options of the schedule are kept. */
 function patch(form) {
   const {cron, time_zone: zone, exact} = form.elements;
   const sources = [...form.querySelectorAll("[data-camera]")].filter((field) => field.value !== field.defaultValue);
@@ -41,7 +41,7 @@ async function tryNow(trying) {
 
 function offerZones(form, list) {
   const zone = form.elements.time_zone;
-  // Filled in here: nobody has begun to edit it.
+  // A default that the script fills in does not count as an edit.
   zone.defaultValue ||= Intl.DateTimeFormat().resolvedOptions().timeZone || "UTC";
   for (const name of Intl.supportedValuesOf("timeZone")) {
     const option = document.createElement("option");

@@ -1,4 +1,4 @@
-// The settings of a venue: its name and field, alarms, lenses, and its end. Each is saved by itself, on the venue that the page shows.
+// The settings of a venue: name and field, alarms, lenses, and deletion. Each form is saved alone, if the venue is unchanged.
 
 import {ask, asLabelled, call, root} from "./page.js";
 
@@ -7,7 +7,7 @@ const address = `${root}/venues/${box.dataset.venue}`;
 const ifSame = () => ({"If-Match": box.dataset.tag});
 const end = document.getElementById("delete");
 
-/** Do what a form is for; what stands in the way is said in it. */
+/** Submit a form, and show errors in it. */
 function onSubmit(form, act) {
   const refused = form.querySelector("[data-refused]");
   form.addEventListener("submit", async (event) => {
@@ -22,7 +22,7 @@ function onSubmit(form, act) {
   });
 }
 
-/** The number in a box, null of an empty one. */
+/** The number in an input, null if it is empty. */
 function numberIn({value}) {
   const typed = value.trim();
   const number = Number(typed.replace(",", "."));
@@ -38,7 +38,7 @@ async function change(patch) {
 const MEASURES = ["length_m", "width_m", "line_width_m"];
 const venue = document.getElementById("venue");
 
-/** What was changed of the field: a blank measure, or one that was left as it was while the sport changed, is the sport's. */
+/** The changes of the field: an empty dimension, or an unchanged one after a change of the sport, becomes the sport's default. */
 function changedField({template, ...fields}) {
   const isSportChanged = !template.disabled && ![...template.options].some((one) => one.selected && one.defaultSelected);
   const changed = MEASURES.filter((name) => isSportChanged || fields[name].value.trim() !== fields[name].defaultValue);
@@ -63,7 +63,7 @@ onSubmit(alarms, () => {
   return change({alarms: rules.some(([, value]) => value !== null) ? Object.fromEntries(rules) : null});
 });
 
-/** The lens in what somebody typed or chose; what it leaves out is not taken from the lens before. */
+/** The lens that somebody typed or chose; members that it lacks are not taken from the stored lens. */
 function readLens(form) {
   let given;
   try {
@@ -85,7 +85,7 @@ for (const form of box.querySelectorAll("[data-lens-of]")) {
 
 end.elements.typed.addEventListener("input", () => { end.querySelector("button").disabled = end.elements.typed.value !== box.dataset.venue; });
 onSubmit(end, async () => {
-  // By keys a form is sent whatever its button says.
+  // The Enter key submits a form even if its button is disabled.
   if (end.elements.typed.value !== box.dataset.venue) throw new Error(`Type ${box.dataset.venue}.`);
   const effect = "Its poses, their history and its trends are gone for good. Nobody can restore them.";
   if (!await ask({asks: `Delete ${box.dataset.venue}?`, effect, does: "Delete for good", isDanger: true})) return;

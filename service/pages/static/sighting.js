@@ -1,11 +1,11 @@
-// A frame in which points are clicked, and the shapes that are drawn over it.
+// A frame in which points are clicked, with shapes drawn over it.
 
 import {pictureOf} from "./frames.js";
 
 const SVG = "http://www.w3.org/2000/svg";
 const LOUPE = {side: 200, reach: 25};
 
-/** A new shape `inside` of another. */
+/** A new SVG element `inside` another. */
 export function drawn(name, attributes, inside) {
   const element = document.createElementNS(SVG, name);
   for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
@@ -13,7 +13,7 @@ export function drawn(name, attributes, inside) {
   return element;
 }
 
-/** The frame that points are clicked in: what was clicked, the field as the pose has it, a loupe, a cross for keys. */
+/** The frame with its clicked points, the field projected by the pose, a loupe, and a cursor for the keyboard. */
 export class Sighting {
   constructor(camera) {
     this.camera = camera;
@@ -21,7 +21,7 @@ export class Sighting {
     this.canvas = camera.one("[data-frame]");
     this.marks = camera.one("[data-marks]");
     this.loupe = camera.one("[data-loupe]");
-    // Before the frame is there, nothing in it can be pointed at.
+    // Ignore the pointer until the frame is loaded.
     const onFrame = (kind, act) => this.box.addEventListener(kind, (event) => { if (this.bitmap) act(event); });
     onFrame("pointermove", (event) => this.aim(this.pixel(event)));
     onFrame("pointerleave", () => { this.loupe.hidden = true; });
@@ -39,7 +39,7 @@ export class Sighting {
     this.unit = width / 400;
   }
 
-  /** Where in the frame, whose pixel centres are at integers. */
+  /** Position in the frame, whose pixel centres are at integers. */
   pixel(event) {
     const rect = this.canvas.getBoundingClientRect();
     const place = (value, start, extent, size) => Math.round(10 * (((value - start) / extent) * size - 0.5)) / 10;
@@ -61,7 +61,7 @@ export class Sighting {
       context.lineTo(c, d);
     }
     context.stroke();
-    // Out of the way of what it shows.
+    // The loupe must not cover what it shows.
     this.loupe.classList.toggle("left", x > this.bitmap.width / 2);
     this.drawCross();
   }

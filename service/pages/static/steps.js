@@ -1,4 +1,4 @@
-// What the pages share on which a venue is described step by step.
+// Shared code of the pages that describe a venue step by step.
 
 import {drawn} from "./sighting.js";
 
@@ -13,10 +13,10 @@ export function number(text) {
   return text.trim() === "" ? undefined : Number(text.replace(",", "."));
 }
 
-// Latin letters that are no letter with a mark, as `id_like` of the service spells them out.
+// Latin letters that Unicode does not decompose, as in `id_like` of the service.
 const SPELT_OUT = {"æ": "ae", "đ": "d", "ð": "d", "ı": "i", "ł": "l", "ø": "o", "œ": "oe", "ß": "ss", "þ": "th"};
 
-/** The id that is spelt most like a name: "Süd 01" becomes "sud-01"; empty where none of it can be kept. */
+/** The id closest to a name: "Süd 01" becomes "sud-01"; empty if no character can be kept. */
 export function idLike(name) {
   const spelt = [...name.toLowerCase()].map((letter) => SPELT_OUT[letter] ?? letter).join("");
   const plain = spelt.normalize("NFKD").replace(/\p{Mn}/gu, "");
@@ -31,7 +31,7 @@ export function later(act) {
   };
 }
 
-/** The pitch from above, y up, with the words that points are named by. */
+/** The pitch from above, y up, labelled with the words in the names of points. */
 export function drawPlan(svg, plan) {
   const {length_m: length, width_m: width} = plan.field;
   const margin = 0.07 * length;

@@ -1,10 +1,10 @@
-// Server-sent events for as long as somebody looks: a hidden page holds no connection, a lost one is taken up again.
+// Server-sent events while the page is visible: a hidden page closes its connection, a lost one is opened again.
 
 const AGAIN = 5000;
 
 /** Call `acts[kind](event)` for the events of an address until the signal is aborted.
  *
- * `isLost(true)` when the connection has been away for some seconds, `isLost(false)` when it is back.
+ * Calls `isLost(true)` after some seconds without connection, and `isLost(false)` when it is back.
  */
 export function listen(address, acts, signal, isLost = () => {}) {
   let source = null;
@@ -32,7 +32,7 @@ export function listen(address, acts, signal, isLost = () => {}) {
     });
     source.addEventListener("error", () => {
       lateTimer ||= setTimeout(() => isLost(true), AGAIN);
-      // A browser connects again by itself, but not after an answer that is an error.
+      // Browsers reconnect by themselves, but not after an error status.
       if (source?.readyState === EventSource.CLOSED) againTimer = setTimeout(open, AGAIN);
     });
     for (const [kind, act] of Object.entries(acts)) source.addEventListener(kind, act);

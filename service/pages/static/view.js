@@ -1,4 +1,4 @@
-// The stitched view of a venue: its knobs, what they do to the last frames, and the packages of it for other tools.
+// The stitched view of a venue: its controls, a preview with the last frames, and packages for other tools.
 
 import {call, root} from "./page.js";
 import {whenShown} from "./parts.js";
@@ -19,25 +19,25 @@ class View {
     this.isDrawing = false;
     form.addEventListener("input", (event) => this.turn(event.target));
     form.addEventListener("submit", (event) => this.keep(event));
-    // The values are back after the event.
+    // The reset has restored the values only after the event.
     form.addEventListener("reset", () => setTimeout(() => this.changed()));
     this.angles.disabled = form.elements.projection.value === "birds-eye";
     if (!this.picture) return;
     this.seam.addEventListener("change", () => this.draw());
-    // Not before somebody sees it: the frames are stitched anew.
+    // Only when it comes into view: the preview costs a stitching of frames.
     const seen = new IntersectionObserver(([{isIntersecting}]) => isIntersecting && this.draw());
     seen.observe(this.picture);
     signal.addEventListener("abort", () => { seen.disconnect(); clearTimeout(this.pause); });
   }
 
-  /** The view that is chosen, as a venue keeps it; null: as it suits the cameras. */
+  /** The chosen view as the venue stores it; null: the default. */
   get chosen() {
     const numbers = [...OF_SIZE, ...OF_ANGLES].map((name) => [name, this.form.elements[name].value]);
     const view = Object.fromEntries(numbers.map(([name, value]) => [name, value === "" ? null : Number(value)]));
     return {projection: this.form.elements.projection.value, ...view, pan_deg: view.pan_deg ?? 0};
   }
 
-  /** The same as a request has it. */
+  /** The chosen view as query parameters. */
   query(more) {
     const parts = Object.entries({...this.chosen, ...more}).map(([name, value]) => [name, value === null ? "auto" : value]);
     return new URLSearchParams(parts);
@@ -48,7 +48,7 @@ class View {
     this.refused.hidden = !text;
   }
 
-  /** Show the view, and then the one that was chosen meanwhile. */
+  /** Show the view; if it changes meanwhile, show the new one next. */
   async draw() {
     const {picture} = this;
     if (!picture || this.isDrawing) return;
@@ -79,7 +79,7 @@ class View {
     this.pause = setTimeout(() => this.draw(), PAUSE);
   }
 
-  /** A knob and the number beside it say the same. */
+  /** Keep a slider and its number in step. */
   turn({dataset: {knob}, name, value}) {
     if (knob) this.form.elements[knob].value = value;
     else if (OF_ANGLES.includes(name) && value !== "") this.form.querySelector(`[data-knob="${name}"]`).value = value;

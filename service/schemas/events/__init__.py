@@ -1,1 +1,1 @@
-"""What is told of a venue, unasked: events, who hears of them, and which addresses may."""
+"""Events of venues, and the webhooks and callbacks that deliver them."""

@@ -1,4 +1,4 @@
-"""Addresses that may be told of the end of a job: what is refused at once, and what only when it is looked up."""
+"""Checks of callback URLs, so that the service calls no host that its operator does not allow (SSRF)."""
 
 from __future__ import annotations
 
@@ -19,7 +19,10 @@ NAT64 = ipaddress.ip_network("64:ff9b::/96")
 
 
 def check(url: str, settings: Settings, member: str = "callback_url") -> None:
-    """Refuse an address that could not be told; a name is looked up only when it is called. `member`: what gave it."""
+    """Raise `Problem` for a callback URL that is not allowed; host names are checked later, at each call.
+
+    `member`: name of the option in error messages.
+    """
     parsed = httpx.URL(url)
     if not settings.webhook_keys:
         raise _refusal(
@@ -38,14 +41,14 @@ def check(url: str, settings: Settings, member: str = "callback_url") -> None:
 
 
 def is_callback_allowed(host: str, address: str, settings: Settings) -> bool:
-    """Whether a host may be told of something at an address: a public one, or one that the operator allows."""
+    """True if callbacks may go to a host at an IP address: a public one, or one that the operator allows."""
     return (
         settings.callback_allow_private or is_public(address) or hosts.is_permitted(host, [address], settings.callbacks)
     )
 
 
 def is_public(address: str) -> bool:
-    """Whether an IP address is a host's on the public internet, also behind the IPv6 forms of an IPv4 address."""
+    """True for an IP address of the public internet; IPv6 forms of IPv4 addresses count as the IPv4 address."""
     ip = ipaddress.ip_address(address.partition("%")[0])
     if isinstance(ip, ipaddress.IPv6Address):
         inner = ip.ipv4_mapped or ip.sixtofour or (ipaddress.IPv4Address(ip.packed[-4:]) if ip in NAT64 else None)

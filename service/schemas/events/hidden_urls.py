@@ -1,4 +1,4 @@
-"""Addresses that are told of something, as they are shown: whoever knows the path of one may often post there."""
+"""Shortened URLs of callbacks in answers: anybody who knows the path of one may often post there."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ HIDDEN_URL = re.compile(rf"https?://[^/]+/{re.escape(HIDDEN)}-[0-9a-f]{{8}}")
 
 
 def hide_path(url: str) -> str:
-    """An address as it is shown: the host, and in place of the rest a mark by which the service knows it again."""
+    """Return a URL with its path replaced by a short hash, by which the service recognises it."""
     parts = urlsplit(url)
     if parts.path in ("", "/") and not parts.query and not parts.fragment:
         return url
@@ -22,7 +22,7 @@ def hide_path(url: str) -> str:
 
 
 def restore_url(url: str, known: Collection[str]) -> str:
-    """The address that a client means who sends back what was shown; any other is itself."""
+    """Return the known URL whose shortened form a client sent back; any other URL unchanged."""
     if not HIDDEN_URL.fullmatch(url):
         return url
     for address in known:

@@ -1,4 +1,4 @@
-"""What happens to a venue, as those hear of it who follow it."""
+"""Events of a venue, as webhooks and event streams deliver them."""
 
 from __future__ import annotations
 
@@ -16,40 +16,42 @@ from service.schemas.history import Cause
 from service.schemas.job import JobEvent
 from service.schemas.names import EventKind
 
-# Nothing comes after it.
+# The last event of a venue.
 FINAL_EVENT = "venue.deleted"
 
 
 class Poses(Schema):
-    """The cameras of a venue as they stand: what draws on their pictures needs nothing else."""
+    """Current poses and lenses of a venue's cameras: all that is needed to draw on their pictures."""
 
     venue: Id
-    revision: int = Field(description="In the history of the venue. It grows: of two, the higher one holds.")
+    revision: int = Field(description="Revision in the history of the venue; the highest one is current.")
     cause: Annotated[Cause, OPEN_WORD]
-    job: str | None = Field(description="Whose poses these are; of a restored revision, whose were rejected by hand.")
+    job: str | None = Field(
+        description="Job that found these poses; for a restored revision, the job whose poses were rejected by hand."
+    )
     stitch_error_px: float | None
     ridge: list[Row] | None
     cameras: list[PosedCamera]
-    changed: list[Id] = Field(description="The cameras that stand or image otherwise than by the revision before.")
+    changed: list[Id] = Field(description="Cameras whose pose or lens differs from the previous revision.")
 
 
 class PosesEvent(Attributed):
-    """`poses.changed`: by a calibration, by hand or by PUT. `poses.current`: how a stream of events begins."""
+    """New poses by a calibration, by hand or by PUT (`poses.changed`); first event of a stream (`poses.current`)."""
 
     type: Literal["poses.changed", "poses.current"]
-    timestamp: datetime = Field(description="Since when they hold.")
+    timestamp: datetime = Field(description="Time since which the poses are current.")
     data: Poses
 
 
 class VenueChange(Schema):
-    """A venue that was put, changed or deleted."""
+    """A venue that was created, changed or deleted."""
 
     venue: Id
-    changed: list[str] = Field(description="The parts of it that PUT or PATCH changed.")
+    changed: list[str] = Field(description="Fields of the venue that PUT or PATCH changed.")
 
 
 class VenueEvent(Attributed):
-    """Somebody put a venue, changed or deleted it."""
+    """Event of a venue that was created, changed or deleted."""
 
     type: Literal["venue.created", "venue.changed", "venue.deleted"]
     timestamp: datetime
@@ -58,10 +60,10 @@ class VenueEvent(Attributed):
 
 Event = Annotated[PosesEvent | VenueEvent | JobEvent | AlarmEvent, Field(discriminator="type")]
 EVENT_MODELS: tuple[type[Attributed], ...] = get_args(get_args(Event)[0])
-# Those of a newer version are passed over.
+# Clients skip other types, of newer versions.
 EVENT_TYPES = frozenset(word for event in EVENT_MODELS for word in get_args(event.model_fields["type"].annotation))
 
 
 def matches_kinds(event: str, kinds: Collection[EventKind]) -> bool:
-    """Whether an event of this type is of one of the kinds."""
+    """True if an event type, such as `venue.changed`, is of one of the kinds, such as `venue.*`."""
     return event in kinds or f"{event.partition('.')[0]}.*" in kinds

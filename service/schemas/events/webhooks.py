@@ -1,4 +1,4 @@
-"""Who is told of what happens to a venue: a part of the venue, so apart from all that can happen."""
+"""Webhooks of a venue. Apart from the events: a venue has webhooks, and events have venues."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ WEBHOOK_EXAMPLE: dict[str, Any] = {"url": "https://example.com/poses", "events":
 
 
 class Webhook(Schema):
-    """An address that is told of what happens to a venue, signed (Standard Webhooks), again for a day if need be."""
+    """URL that gets events of a venue as signed POSTs (Standard Webhooks), with retries for a day."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [WEBHOOK_EXAMPLE]})
 

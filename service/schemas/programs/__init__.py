@@ -1,1 +1,1 @@
-"""What programs beside the API are asked, and what they answer."""
+"""Messages between the service and its child programs."""

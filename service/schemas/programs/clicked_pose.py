@@ -1,4 +1,4 @@
-"""What the program that finds a first pose while somebody clicks is asked, and what it answers."""
+"""Request and answer of the program that finds a first pose while somebody clicks points."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Polyline = list[list[float]]
 
 
 class ClickedPoseRequest(Schema):
-    """A camera that has no pose yet, and what was clicked in its frame."""
+    """A camera without a pose, and the points that were clicked in its frame."""
 
     field: FieldOfPlay
     id: Id
@@ -27,7 +27,10 @@ class ClickedPoseRequest(Schema):
 
 
 class ClickedPose(Schema):
-    """Its pose, or why there is none yet; the field by this pose and each point's place by it, in pixels."""
+    """Pose of the camera, or the reason why there is none yet.
+
+    `lines`: polylines of the field projected by the pose, px; `expected`: the projection of each clicked point, px.
+    """
 
     result: LocateResult | None
     error: JobError | None

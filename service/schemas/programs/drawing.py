@@ -1,4 +1,4 @@
-"""What the program that draws pictures is asked, and what it answers: a line of JSON each, and files behind it."""
+"""Request and answer of the program that draws pictures: a line of JSON, followed by files."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from service.schemas.field import FieldOfPlay
 from service.schemas.geometry import Light, PosedCamera
 from service.schemas.programs.files import split_files
 
-# Somebody waits for the program, and all that a venue and a result can be takes as long to load as NumPy.
+# For types only: the models of venues and results take as long to load as NumPy, and somebody waits for the program.
 if TYPE_CHECKING:
     from service.schemas.results import MarkingResult, Result
     from service.schemas.venue import Venue
 
 FLAT = ("scpr",)
-"""The presets that calibrate on a plane, whatever the venue has."""
+"""Presets that calibrate on a plane even if the venue has a ridge."""
 
 
 class FieldAndCameras(BaseModel):
@@ -28,7 +28,7 @@ class FieldAndCameras(BaseModel):
 
 
 class MarkingToDraw(BaseModel):
-    """What is said of a marking; `offset_m` ± `sigma_m` on its `side`."""
+    """A marking with what was found of it; its paint is `offset_m` ± `sigma_m` off, on its `side`."""
 
     name: str
     expected_m: float
@@ -39,10 +39,10 @@ class MarkingToDraw(BaseModel):
 
 
 class DrawingRequest(BaseModel):
-    """Pictures of a calibration: how all stood when the job began (`stored`) and as it was `found`.
+    """Request for pictures of a calibration: field and cameras before the job (`stored`) and as it `found` them.
 
-    `markings`, `lights` and `ignore`, polygons of what is not looked at: by camera.
-    `names`: of the pictures; `sizes`: bytes of the frames that follow, one of each camera that is needed.
+    `markings`, `lights` and `ignore` (polygons) are by camera. `names`: names of the pictures; `sizes`: bytes of the
+    frames that follow, one for each camera that is needed.
     """
 
     stored: FieldAndCameras
@@ -58,7 +58,7 @@ class DrawingRequest(BaseModel):
     def of(
         cls, venue: Venue, result: Result, names: Sequence[str], threads: int, files: Mapping[str, bytes]
     ) -> DrawingRequest:
-        """What a job had before it when it was done."""
+        """Return the request for pictures of a job, from the venue that it began with and its result."""
         stored = FieldAndCameras(field=venue.field, cameras=[camera.posed for camera in venue.cameras])
         cameras = [
             camera.model_copy(update={"pose": new.pose, "intrinsics": new.intrinsics or camera.intrinsics})
@@ -90,7 +90,7 @@ def _marking(seen: MarkingResult) -> MarkingToDraw:
 
 
 def _field_found(venue: Venue, result: Result) -> FieldOfPlay:
-    """As it was finished on: flat, or with the ridge that was found."""
+    """Return the field that the poses were refined on: flat, or with the ridge that was found."""
     options = result.provenance.options
     if options.get("flat") or options.get("preset") in FLAT:
         return venue.field.model_copy(update={"ridge": None})
@@ -98,16 +98,16 @@ def _field_found(venue: Venue, result: Result) -> FieldOfPlay:
 
 
 class DrawnPictures(BaseModel):
-    """The pictures that follow, and their bytes; one that cannot be drawn is missing."""
+    """Answer: sizes in bytes of the pictures that follow, by name; those that cannot be drawn are missing."""
 
     sizes: dict[str, int]
 
 
-def encode_message(told: DrawingRequest | DrawnPictures, files: Mapping[str, bytes]) -> bytes:
-    """The line and the files."""
-    return b"".join((told.model_dump_json().encode(), b"\n", *files.values()))
+def encode_message(message: DrawingRequest | DrawnPictures, files: Mapping[str, bytes]) -> bytes:
+    """Return a message as a line of JSON, followed by its files."""
+    return b"".join((message.model_dump_json().encode(), b"\n", *files.values()))
 
 
 def decode_files(sizes: dict[str, int], data: bytes) -> dict[str, bytes]:
-    """The files behind the line."""
+    """Return the files after the line of JSON by their names."""
     return split_files(data[data.index(b"\n") + 1 :], sizes)

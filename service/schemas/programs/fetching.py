@@ -1,4 +1,4 @@
-"""What is known of a source that was asked for a frame."""
+"""Outcome of fetching a frame from a source."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class SourceFetch:
-    """One source that was asked for a frame: the seconds that it took, and whether a frame came."""
+    """Fetch of one source: its duration, and whether it gave a frame."""
 
     seconds: float
     got_frame: bool

@@ -1,4 +1,4 @@
-"""Files that lie one behind the other in what a program is given or says; a line before them tells their sizes."""
+"""Concatenated files in a message of a program, whose first line has their sizes."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 
 def split_files(data: bytes | bytearray, sizes: Mapping[str, int]) -> dict[str, bytes]:
-    """The files by their names, from their `sizes` in bytes."""
+    """Split concatenated files by their `sizes` in bytes; return them by name."""
     files, begin = {}, 0
     for name, size in sizes.items():
         files[name], begin = bytes(data[begin : begin + size]), begin + size

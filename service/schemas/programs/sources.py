@@ -1,6 +1,6 @@
-"""What the program that fetches frames from the sources of cameras is asked, and what it answers.
+"""Request and answer of the program that fetches frames from the sources of cameras.
 
-A module of its own: for each fetch a process loads it.
+Imports little: each fetch starts a process that loads this module.
 """
 
 from __future__ import annotations
@@ -11,33 +11,33 @@ from pydantic import BaseModel, Field
 
 
 class SourceTask(BaseModel):
-    """What the program reads on its standard input."""
+    """Request of a fetch, on the program's standard input."""
 
-    # By camera: the address as it is shown, and what is secret in it (see SourceSecrets).
+    # By camera: the address without secrets, and the encoded secrets (see SourceSecrets).
     sources: dict[str, tuple[str, str | None]]
     allowed: list[str]
     folder: str
     seconds: float
     most_bytes: int
     most_pixels: int
-    # Of each camera, and from the beginning of one to the beginning of the next.
+    # Frames of each camera, and the time from one to the next.
     frames: int = 1
     spacing_s: float = 0.0
 
 
 class SourceAnswer(BaseModel):
-    """A line that it prints for each camera; `why`: a frame is missing. Otherwise all are in their files."""
+    """Answer for one camera, a line of the program's output; `why`: reason of a missing frame, None if all came."""
 
     camera: str
     why: str | None = None
-    seconds: float = Field(0.0, description="That it took, but for the time between frames.")
+    seconds: float = Field(0.0, description="Duration of the fetch without the time between frames.")
 
 
 def frame_file(task: SourceTask, camera: str, number: int) -> Path:
-    """Where the program puts a frame of a camera."""
+    """Return the file that the program writes a frame of a camera to."""
     return Path(task.folder) / f"{camera}.{number}"
 
 
 def longest_s(task: SourceTask) -> float:
-    """After which the program gives up."""
+    """Return the time after which the program gives up, seconds."""
     return task.seconds + (task.frames - 1) * task.spacing_s

@@ -1,4 +1,4 @@
-"""What the program that makes stitched views is asked: a line of JSON, and behind it the frames of a picture."""
+"""Request of the program that makes stitched views: a line of JSON, followed by frames."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from service.schemas.view import ViewChoice
 
 
 class StitchRequest(BaseModel):
-    """A package, or a picture of what it makes of frames.
+    """Request for a package of maps, or for a stitched picture of frames (`wanted`).
 
-    `lights` by camera, of those that have any; `revision` of the poses; `tag`: the package's; `seam`: whether to draw
-    it into the picture; `sizes`: bytes of the frames that follow, in the cameras' order.
+    `lights`: photometric corrections by camera; `revision`: of the poses; `tag`: the package's; `seam`: draw the seams
+    into the picture; `sizes`: bytes of the frames that follow, in the cameras' order.
     """
 
     venue: str

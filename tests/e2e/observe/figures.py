@@ -1,4 +1,4 @@
-"""What Prometheus would read of a service."""
+"""Metrics of a service, parsed as Prometheus does."""
 
 from prometheus_client.parser import text_string_to_metric_families
 

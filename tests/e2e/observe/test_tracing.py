@@ -36,7 +36,7 @@ sys.meta_path.insert(0, Hidden())
 
 
 class Collector:
-    """What an OpenTelemetry collector does with spans, but for keeping them anywhere."""
+    """An OpenTelemetry collector that keeps spans in memory."""
 
     def __init__(self):
         self.spans = []
@@ -69,9 +69,9 @@ class Collector:
 
 @pytest.fixture(scope="module")
 def traced(tmp_path_factory):
-    """What is collected of a service that a caller with a trace asked for a job, and another for one that crashed.
+    """Spans of a service that ran a job for a caller with a trace, and a job that crashed.
 
-    Gives the spans of a service by its name, and the first job.
+    Yields a function from the name of a service to its spans, and the first job.
     """
     collector = Collector()
     sent = {"OTEL_EXPORTER_OTLP_ENDPOINT": collector.url, "OTEL_BSP_SCHEDULE_DELAY": "100"}

@@ -1,4 +1,4 @@
-"""What the service tells those who watch it: readiness, metrics, logs."""
+"""Readiness, metrics and logs of a running service."""
 
 import json
 
@@ -26,6 +26,9 @@ def test_what_a_worker_did_is_told_by_the_api(service, name):
     (worker,) = [dict(key[1:]) for key in found if key[0] == "esc_worker_model_info"]
     assert found["esc_worker_up", ("worker", worker["worker"])] == 1
     assert len(worker["sha256"]) == 64
+    # A held answer is timed apart: the end of the job was waited for.
+    routes = {dict(key[1:])["route"] for key in found if key[0] == "esc_http_request_duration_seconds_count"}
+    assert "/jobs/{job_id}?wait" in routes
 
 
 def test_what_callers_send_makes_no_new_series(service):
@@ -45,12 +48,6 @@ def test_what_callers_send_makes_no_new_series(service):
         odd(number)
     assert series() == before
     assert all({name for name, _ in key[1:]} <= {*LABELS_OF_CALLERS, "le"} for key in before)
-
-
-def test_a_held_answer_is_timed_apart(service, name):
-    service.calibrated(service.venue(name))
-    routes = {dict(key[1:])["route"] for key in figures(service) if key[0] == "esc_http_request_duration_seconds_count"}
-    assert "/jobs/{job_id}?wait" in routes
 
 
 def test_units_and_suffixes_are_those_of_prometheus(service):
@@ -99,7 +96,8 @@ def test_the_worker_calls_a_job_what_its_request_was_called(service, name):
         )
     )
     assert {(line["request"], line["trace"]) for line in lines} == {("night-run-7", trace)}
-    assert [line["verdict"] for line in lines if line["event"] == "job ends"] == ["accepted"]
+    (end,) = [line for line in lines if line["event"] == "job ends"]
+    assert [end.get(part) for part in ("verdict", "why", "cameras")] == ["accepted", None, None]
     assert {line["venue"] for line in lines} == {name}
     (asked,) = [line for line in log(service) if line.get("path") == f"/venues/{name}/calibrate"]
     assert (asked["request"], asked["trace"], asked["status"]) == ("night-run-7", trace, 202)
@@ -111,7 +109,6 @@ def test_the_worker_calls_a_job_what_its_request_was_called(service, name):
         ("reject", {"verdict": "rejected", "why": "the lines do not fit", "cameras": ["left", "right"]}),
         ("partly", {"verdict": "partly", "why": "the lines do not fit", "cameras": ["right"]}),
         ("fail", {"verdict": "no-markings-in-view", "why": "It is black.", "cameras": ["left"]}),
-        ("accept", {"verdict": "accepted", "why": None, "cameras": None}),
     ],
 )
 def test_the_end_of_a_job_is_logged_with_its_venue_and_why(service, name, behaviour, outcome):

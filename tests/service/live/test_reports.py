@@ -1,4 +1,4 @@
-"""What `esc live` reports: counts since the last report that was taken, and how each camera is doing."""
+"""Reports of `esc live`: counts since the last acknowledged report, and the status of each camera."""
 
 import threading
 import time

@@ -56,7 +56,7 @@ def udp():
 
 
 class Sending:
-    """What is sent while the block runs."""
+    """The samples that are sent while the block runs."""
 
     def __init__(self, destinations, poses=None, rate=FASTEST):
         self.poses = poses or StoredPoses(demo())

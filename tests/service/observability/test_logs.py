@@ -1,4 +1,4 @@
-"""What is logged: lines that may be lost, and no secrets."""
+"""Log lines: they may be lost, and contain no secrets."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""What Prometheus reads of jobs, venues and workers, from the database of each home."""
+"""Metrics of jobs, venues and workers, from the database of each home."""
 
 import time
 from datetime import timedelta

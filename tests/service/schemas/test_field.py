@@ -184,12 +184,6 @@ def test_the_names_in_the_document_are_found():
         assert find(name, field.plan, field.size)
 
 
-def test_the_corner_is_not_the_origin():
-    from_the_corner = own({"name": "halfway", "line": [[10, 0], [10, 10]]})
-    with pytest.raises(ValidationError, match="whose centre is the origin"):
-        FieldOfPlay.model_validate(from_the_corner)
-
-
 def test_other_markings_are_fields_of_other_sports_and_markings_one_by_one():
     field = FieldOfPlay.model_validate(
         {

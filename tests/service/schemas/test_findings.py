@@ -1,4 +1,4 @@
-"""What is wrong with a document, in words of the document."""
+"""Validation errors in words of the document."""
 
 import copy
 import time

@@ -58,5 +58,5 @@ def test_the_list_asks_as_often_for_many_venues_as_for_one(stock):
     assert len(asked) == 2 * of_one
     assert rows[1] == one[0]
     assert [[alarm.rule for alarm in row.alarms] for row in rows] == [["rejected-in-a-row"], [], ["rejected-in-a-row"]]
-    assert [row.glance.last.verdict for row in rows] == ["rejected", "accepted", "rejected"]
+    assert [row.summary.last.verdict for row in rows] == ["rejected", "accepted", "rejected"]
     assert [row.active and row.active.id for row in rows] == [None, active, None]

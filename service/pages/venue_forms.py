@@ -1,4 +1,4 @@
-"""Changing a venue that is there: its settings, and new first poses of its cameras."""
+"""Forms of a venue: its settings, ignored areas and first poses, and frames for a calibration or a search."""
 
 from __future__ import annotations
 
@@ -17,25 +17,26 @@ from service.schemas import etags
 from service.schemas.geometry import Intrinsics
 from service.schemas.health import Alarms
 from service.schemas.names import LensModel
+from service.settings import Settings
 from service.store.preconditions import venue_etag
 
-# The last so many calibrations and revisions say what is usual: three months of nights.
+# Calibrations and revisions that suggest limits of alarms: three months of nights.
 SUGGESTED_BY = 100
 router = APIRouter(route_class=Page, include_in_schema=False)
 
 
 @router.get("/ui/venues/{venue_id}/settings", openapi_extra=needs_scope("admin"))
 def settings(venue: ExistingVenue, request: Request, context: InContext) -> Response:
-    """Name and field, alarms, lenses, and the end of a venue."""
-    # NumPy takes its time to load.
+    """Show name, field, alarms and lenses of a venue, and the button that deletes it."""
+    # Imported late: NumPy loads slowly.
     from service.schemas.lens_map import lens_doubts
 
     lenses = {camera.id: _readable(camera.intrinsics) for camera in venue.cameras}
-    shown = venue.model_copy(update={"alarms": venue.alarms or Alarms()})
+    with_alarms = venue.model_copy(update={"alarms": venue.alarms or Alarms()})
     return render_page(
         request,
         "settings.html",
-        venue=shown,
+        venue=with_alarms,
         lenses=lenses,
         templates=NAMES,
         suggested=suggested_limits(
@@ -50,7 +51,7 @@ def settings(venue: ExistingVenue, request: Request, context: InContext) -> Resp
 
 @router.get("/ui/venues/{venue_id}/first-pose", openapi_extra=needs_scope("admin"))
 def first_pose(venue: ExistingVenue, request: Request, context: InContext) -> Response:
-    """Clicking points in new frames of a venue's cameras."""
+    """Show the form for clicking points in new frames of a venue's cameras."""
     return render_page(
         request,
         "first_pose.html",
@@ -62,7 +63,33 @@ def first_pose(venue: ExistingVenue, request: Request, context: InContext) -> Re
     )
 
 
+@router.get("/ui/venues/{venue_id}/ignore", openapi_extra=needs_scope("admin"))
+def ignore(venue: ExistingVenue, request: Request, context: InContext) -> Response:
+    """Show the ignored areas of each camera over the frames of the newest result."""
+    newest = context.past_calibrations.newest_result(venue.id)
+    job = context.jobs.get(newest) if newest else None
+    links = job.links if job else {}
+    frames = {camera.id: links.get(f"frame/{camera.id}") for camera in venue.cameras}
+    return render_page(request, "ignore.html", venue=venue, frames=frames)
+
+
+@router.get("/ui/venues/{venue_id}/calibrate", openapi_extra=needs_scope("calibrate"))
+def calibrate(venue: ExistingVenue, request: Request, context: InContext) -> Response:
+    """Show the form for a calibration."""
+    return render_page(request, "calibrate.html", venue=venue, limits=_upload_limits(context.settings))
+
+
+@router.get("/ui/venues/{venue_id}/find", openapi_extra=needs_scope("calibrate"))
+def find(venue: ExistingVenue, request: Request, context: InContext) -> Response:
+    """Show the form for a search for cameras."""
+    return render_page(request, "find.html", venue=venue, limits=_upload_limits(context.settings))
+
+
+def _upload_limits(limits: Settings) -> dict[str, int]:
+    return {"frames": limits.max_frames_per_camera, "bytes": round(limits.max_frame_mb * 1e6)}
+
+
 def _readable(lens: Intrinsics) -> str:
-    """JSON with a line for each part."""
+    """Return a lens as JSON with a line for each member."""
     parts = [f"  {json.dumps(name)}: {json.dumps(value)}" for name, value in lens.model_dump(mode="json").items()]
     return "{\n" + ",\n".join(parts) + "\n}"
