@@ -16,7 +16,7 @@ MISSPELT = 0.8
 
 
 class UnknownLandmark(ValueError):  # noqa: N818
-    """No point of the field has this name; `near` are names that are like it."""
+    """Raised when no point of the field has this name; `near` are similar names."""
 
     def __init__(self, name: str, near: list[str]) -> None:
         super().__init__(f"no point is called {name!r}" + (f"; near it: {'; '.join(near)}" if near else ""))
@@ -25,9 +25,9 @@ class UnknownLandmark(ValueError):  # noqa: N818
 
 
 def find(name: str, template: Template, size: Mapping[str, float]) -> Point:
-    """Where the point of this name is, whatever its case, spaces and punctuation. Raises `UnknownLandmark`.
+    """Return the place of a named point, whatever the case, spaces and punctuation; raises `UnknownLandmark`.
 
-    In a name such as `near touchline, 22 m from the left goal line` any number may stand.
+    A name such as `near touchline, 22 m from the left goal line` may have any number.
     """
     places = {_plain(known): (known, point) for known, point in template.places(size).items()}
     wanted = _plain(name)

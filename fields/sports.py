@@ -23,7 +23,7 @@ OTHER_NAMES = {
     "volleyball": ("volley", "indoor volleyball"),
 }
 LONGEST = 40
-"""Characters of a name that are compared: no sport has as many, and what a stranger sends may have millions."""
+"""Largest number of characters of a name that are compared: a stranger may send millions."""
 
 
 def template_name(typed: str) -> str | None:

@@ -28,7 +28,7 @@ AXIS = re.compile(r"(?P<sign>-?)(?P<name>[a-z]+)(?P<offset>[+-][0-9.]+)?")
 
 @dataclass(frozen=True)
 class EncoderCounts:
-    """What is sent as zoom and focus of a camera."""
+    """Counts that FreeD has for the zoom and the focus of a camera."""
 
     zoom: int = 0
     focus: int = 0

@@ -1,4 +1,4 @@
-"""What every format needs to know of a camera: its numbers by name, and what its lens has that a format cannot say."""
+"""A camera as the formats take it: its numbers by name, and a check that a format can hold its lens."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class NumberedCamera:
 
     @property
     def id(self) -> str:
-        """The camera's."""
+        """Id of the camera."""
         return self.camera.id
 
     @property
@@ -62,8 +62,8 @@ class NumberedCamera:
         ]
         return [list(row) for row in zip(*columns, strict=True)]
 
-    def require_support(self, name: str, held: Collection[str]) -> None:
-        """Refuse a lens that has more than skew 0 and the coefficients `held`: what is left out is pixels wrong."""
+    def require_support(self, name: str, supported: Collection[str]) -> None:
+        """Refuse a lens with skew or coefficients that are not `supported`: without them points are pixels off."""
         if self.camera.intrinsics.model == "fisheye":
             raise Problem(
                 "format-cannot-hold",
@@ -71,7 +71,7 @@ class NumberedCamera:
                 camera=self.id,
                 got=["fisheye"],
             )
-        beyond = [key for key, value in self.coefficients.items() if value != 0 and key not in held]
+        beyond = [key for key, value in self.coefficients.items() if value != 0 and key not in supported]
         if self.camera.intrinsics.matrix[0][1] != 0:
             beyond.append("skew")
         if beyond:

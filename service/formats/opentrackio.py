@@ -34,9 +34,9 @@ UNKNOWN = "unknown"
 
 @dataclass(frozen=True)
 class SampleTime:
-    """When a sample that is sent was taken: `unix_ns` by the clock of the machine, the `number` of the sample from 0.
+    """Time of a sample of a stream: `unix_ns` by the clock of the machine, and the `number` of the sample from 0.
 
-    `rate`: samples a second; `status`: of the tracking.
+    `rate`: samples a second; `status`: that of the tracking.
     """
 
     unix_ns: int
@@ -47,7 +47,7 @@ class SampleTime:
 
 @dataclass(frozen=True)
 class Frame:
-    """Which frame of a clip a sample is of: its `number` from 0, at `rate` a second. `status`: of the tracking."""
+    """A frame of a clip: its `number` from 0, at `rate` frames a second; `status`: that of the tracking."""
 
     number: int
     rate: Fraction
@@ -124,7 +124,7 @@ def _sample(shot: NumberedCamera, angles: tuple[float, float, float]) -> dict[st
 
 
 def _with_sample_id(sample: dict[str, Any]) -> dict[str, Any]:
-    """The same sample has the same id."""
+    """Add an id, which is the same for the same sample."""
     return sample | {"sampleId": uuid.uuid5(SOURCES, json.dumps(sample, sort_keys=True)).urn}
 
 

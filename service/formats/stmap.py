@@ -18,5 +18,5 @@ def write(
     program: Sequence[str],
     environment: Mapping[str, str],
 ) -> bytes:
-    """Both directions; `origin`: the corner that green counts from."""
+    """Return a zip of the maps of both directions; `origin`: the corner that green counts from."""
     return _maps.run([*program, origin], environment, shot.camera.model_dump_json().encode())
