@@ -31,7 +31,7 @@ class BuildFromSources(build_py):
 
     def run(self) -> None:
         """Build."""
-        # What an earlier build left would go into the wheel.
+        # Files of an earlier build would go into the wheel.
         shutil.rmtree(Path(self.build_lib) / PACKAGE, ignore_errors=True)
         for source in [*reached_modules(HERE / PACKAGE / "__init__.py"), *(SOURCES / "fields").glob("*.toml")]:
             folder = source.parent.relative_to(SOURCES).as_posix()

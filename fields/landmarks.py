@@ -34,12 +34,12 @@ def find(name: str, template: Template, size: Mapping[str, float]) -> Point:
     if wanted in places:
         return places[wanted][1]
     number = NUMBER.search(wanted)
-    measured = {_plain(known): known for known in template.places_at(size, 0.0)}
+    open_names = {_plain(known): known for known in template.places_at(size, 0.0)}
     if number is not None:
-        open_name = measured.get(f"{wanted[: number.start()]}distance{wanted[number.end() :]}")
+        open_name = open_names.get(f"{wanted[: number.start()]}distance{wanted[number.end() :]}")
         if open_name is not None:
             return template.places_at(size, float(number.group()))[open_name]
-    raise UnknownLandmark(name, _like(wanted, {plain: known for plain, (known, _) in places.items()} | measured))
+    raise UnknownLandmark(name, _like(wanted, {plain: known for plain, (known, _) in places.items()} | open_names))
 
 
 def _like(wanted: str, names: Mapping[str, str]) -> list[str]:
@@ -57,6 +57,6 @@ def _words_shared(wanted: list[str], name: list[str]) -> int:
 
 
 def _plain(name: str) -> str:
-    """Small letters, digits and single spaces, as the English write centre."""
+    """Return a name in small letters, digits and single spaces, with `centre` for `center`."""
     words = re.findall(r"\d+\.\d+|[^\W_]+", name.casefold())
     return " ".join("centre" if word == "center" else word for word in words)

@@ -17,7 +17,7 @@ COLOUR_PATTERN = rf"^({'|'.join(COLOURS)}|#[0-9a-fA-F]{{6}})$"
 
 
 class _Movable:
-    """The moves of a shape, by where each of its points gets."""
+    """A shape that is moved by moving its points."""
 
     def _with_points(self, moved: Callable[[Point], Point]) -> Self:
         raise NotImplementedError
@@ -40,7 +40,7 @@ class _Movable:
 
 @dataclass(frozen=True)
 class Line(_Movable):
-    """A polyline through `points`, the middle of the paint; `width` of the paint."""
+    """A polyline of paint: the middle of it runs through `points`; `width` in metres."""
 
     name: str
     points: tuple[Point, ...]
@@ -61,7 +61,7 @@ class Line(_Movable):
         return sum(math.dist(*piece) for piece in pairwise(self.points))
 
     def pieces(self, shares: Iterable[tuple[float, float]]) -> list[Line]:
-        """Dashes of a line of two points, each between two shares of its length."""
+        """Return dashes of a line of two points, each between two shares of its length."""
         (x1, y1), (x2, y2) = self.points
 
         def at(share: float) -> Point:
@@ -75,7 +75,7 @@ class Line(_Movable):
 
 @dataclass(frozen=True)
 class Arc(_Movable):
-    """Counter-clockwise around `centre` from angle `start` to `end` (rad, above `start`), the middle of the paint."""
+    """An arc of paint: the middle of it runs counter-clockwise from angle `start` to `end` (rad, above `start`)."""
 
     name: str
     centre: Point
@@ -111,7 +111,7 @@ class Arc(_Movable):
         return (self.end - self.start) * self.radius
 
     def pieces(self, shares: Iterable[tuple[float, float]]) -> list[Arc]:
-        """Dashes, each between two shares of its length."""
+        """Return dashes, each between two shares of the length of the arc."""
         span = self.end - self.start
         return [
             replace(self, name=f"{self.name}, dash {n}", start=self.start + a * span, end=self.start + b * span)
@@ -141,7 +141,7 @@ Shape = Line | Arc | Spot
 
 
 def dashes(length: float, paint: float, gap: float) -> list[tuple[float, float]]:
-    """Whole dashes from the middle of a length outwards: where each begins and ends, as shares of the length."""
+    """Return the beginning and end of whole dashes from the middle of a length outwards, as shares of the length."""
     each_side = math.floor((length / 2 - paint / 2) / (paint + gap))
     middles = [length / 2 + n * (paint + gap) for n in range(-each_side, each_side + 1)]
     return [((middle - paint / 2) / length, (middle + paint / 2) / length) for middle in middles]

@@ -38,7 +38,7 @@ def nearest_template_name(typed: str) -> str | None:
 
 
 def _letters(name: str) -> str:
-    """The letters and digits of a name, in small: `Ice Hockey`, `ice_hockey` and `icehockey` are one."""
+    """Return the letters and digits of a name in small: `Ice Hockey`, `ice_hockey` and `icehockey` are one."""
     return "".join(letter for letter in name.casefold() if letter.isalnum())
 
 

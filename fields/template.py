@@ -52,7 +52,7 @@ class Extent:
 
 @dataclass(frozen=True)
 class Template:
-    """A sport's field. `size`: the lengths that a field has of its own, `length`, `width` and `line` among them.
+    """The field of a sport. `size`: the lengths that differ between fields, among them `length`, `width` and `line`.
 
     `uneven`: how far a usual ground of this sport is above or below its plane, or its roof, a standard deviation in
     metres.

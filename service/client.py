@@ -60,7 +60,7 @@ from service.schemas.venue import ChangedVenue, RestoredVenue, Venue, VenueIn, V
 
 # Longer than the longest poll.
 TIMEOUT_S = 75
-# How long a service may be away from somebody who follows a job: a restart, a database that comes back.
+# A service may be away for so long while a job is followed: a restart, a database that comes back.
 PATIENCE_S = 60.0
 # A stream of events says ": ping" every 15 s: one that is silent for longer leads nowhere any more.
 SILENCE_S = 45.0
@@ -68,13 +68,13 @@ SILENCE_S = 45.0
 AGAIN_S = 2.0
 # A view of 8192 pixels and many cameras takes minutes.
 PACKAGE_S = 180.0
-# What is reported is old by then.
+# A report is out of date by then.
 REPORT_S = 5.0
 NOTHING: Mapping[str, Any] = MappingProxyType({})
 
 
 class AsyncClient:
-    """One service, by its URL; each call is awaited."""
+    """Client of the service at a URL, whose calls are awaited."""
 
     def __init__(self, url: str, api_key: str | None = None) -> None:
         self._http = httpx.AsyncClient(**_connection(url, api_key))
@@ -164,8 +164,8 @@ class AsyncClient:
 
     async def adopt_field(self, venue_id: str, job_id: str, name: FieldNumber) -> Venue:
         """Store a number of the field as the lines of a calibration have it, of those in `adoptable` of its result."""
-        wanted = {"job": job_id, "name": name}
-        return _read(Venue, await self._ask("POST", f"/venues/{venue_id}/adopt-field", json=wanted))
+        document = {"job": job_id, "name": name}
+        return _read(Venue, await self._ask("POST", f"/venues/{venue_id}/adopt-field", json=document))
 
     async def adopt_found(self, venue_id: str, job_id: str, candidates: Mapping[str, int | None] = NOTHING) -> Venue:
         """Store the cameras that a job has found, as a new venue or as a revision.
@@ -173,14 +173,14 @@ class AsyncClient:
         `candidates`: the number of the one that a camera is taken to be, from 1, None: none of them; of other cameras
         the first one that was accepted.
         """
-        wanted = {"job": job_id, "candidates": dict(candidates)}
-        return _read(Venue, await self._ask("POST", f"/venues/{venue_id}/adopt-found", json=wanted))
+        document = {"job": job_id, "candidates": dict(candidates)}
+        return _read(Venue, await self._ask("POST", f"/venues/{venue_id}/adopt-found", json=document))
 
     async def venue_poses(
         self, venue_id: str, form: FormatName, camera: str | None = None, lens: LensChoice = "stored"
     ) -> bytes:
         """Return the poses in use, of one camera or all, as a file of another tool's format."""
-        return await self._ask("GET", f"/venues/{venue_id}/poses", params=_wanted(form, camera, lens))
+        return await self._ask("GET", f"/venues/{venue_id}/poses", params=_export_params(form, camera, lens))
 
     async def venue_stitch(
         self, venue_id: str, form: StitchFormat, view: Mapping[str, Any] = NOTHING, known: str | None = None
@@ -213,7 +213,7 @@ class AsyncClient:
         while nobody was connected, with `Refused` (404).
         """
         path, params = f"/venues/{venue_id}/events", {"events": list(kinds)}
-        heard = time.monotonic()
+        last_answer_s = time.monotonic()
         while True:
             pause_s = AGAIN_S
             try:
@@ -232,15 +232,15 @@ class AsyncClient:
                                     return
                             fields = {}
                         # Also after whoever asked has taken its time over an event.
-                        heard = time.monotonic()
+                        last_answer_s = time.monotonic()
             except (httpx.TransportError, Refused) as error:
-                if not is_passing(error) or time.monotonic() - heard > patience_s:
+                if not is_passing(error) or time.monotonic() - last_answer_s > patience_s:
                     raise
                 pause_s = pause_s_of(error, AGAIN_S)
             await self._pause(pause_s)
 
     async def report_live(self, venue_id: str, report: LiveReport) -> None:
-        """Report how the live poses of a venue are doing; for the process that sends them."""
+        """Report the state of the live poses of a venue, as the process that sends them."""
         # A service need not know a field that has its default.
         content = report.model_dump(mode="json", exclude_defaults=True)
         await self._ask("PUT", f"/venues/{venue_id}/live", json=content, timeout=REPORT_S)
@@ -316,11 +316,11 @@ class AsyncClient:
         most: int | None = None,
     ) -> list[Job]:
         """Return jobs, newest first: of one venue, in one state, of one kind; `most`: so many of them."""
-        chosen = {name: value for name, value in (("venue", venue), ("status", status), ("kind", kind)) if value}
-        page = _read(Jobs, await self._ask("GET", "/jobs", params=chosen))
+        filters = {name: value for name, value in (("venue", venue), ("status", status), ("kind", kind)) if value}
+        page = _read(Jobs, await self._ask("GET", "/jobs", params=filters))
         found = page.jobs
         while page.next_cursor is not None and (most is None or len(found) < most):
-            more = chosen | {"cursor": page.next_cursor}
+            more = filters | {"cursor": page.next_cursor}
             page = _read(Jobs, await self._ask("GET", "/jobs", params=more))
             found += page.jobs
         return found[:most]
@@ -354,7 +354,7 @@ class AsyncClient:
         self, job_id: str, form: FormatName, camera: str | None = None, lens: LensChoice = "stored"
     ) -> bytes:
         """Return the poses that a job found, of one camera or all, as a file of another tool's format."""
-        return await self._ask("GET", f"/jobs/{job_id}/poses", params=_wanted(form, camera, lens))
+        return await self._ask("GET", f"/jobs/{job_id}/poses", params=_export_params(form, camera, lens))
 
     async def picture(self, of: Job, name: str) -> bytes | None:
         """Return a picture by the name of its link; None: the job made no such picture."""
@@ -362,15 +362,15 @@ class AsyncClient:
 
     async def follow(self, followed: Job, show: Callable[[Job], None] | None = None, every_s: float = 0.5) -> Job:
         """Wait for the end of a job; `show` is called as it goes on. The service may be away for a minute."""
-        heard = time.monotonic()
+        last_answer_s = time.monotonic()
         while followed.open:
             if show is not None:
                 show(followed)
             try:
                 followed = await self.job(followed.id, wait_s=every_s)
-                heard = time.monotonic()
+                last_answer_s = time.monotonic()
             except (httpx.TransportError, Refused) as error:
-                if not is_passing(error) or time.monotonic() - heard > PATIENCE_S:
+                if not is_passing(error) or time.monotonic() - last_answer_s > PATIENCE_S:
                     raise
                 await self._pause(pause_s_of(error, every_s))
         return followed
@@ -431,7 +431,7 @@ class _Blocking(AsyncClient):
 
 
 class Client:
-    """One service, by its URL; each call waits for its answer."""
+    """Client of the service at a URL, whose calls block."""
 
     def __init__(self, url: str, api_key: str | None = None) -> None:
         self.calls = _Blocking(url, api_key)
@@ -485,7 +485,7 @@ class Client:
 
 def _connection(url: str, api_key: str | None) -> dict[str, Any]:
     headers = {"Authorization": f"Bearer {api_key}"} if api_key else {}
-    # Where there is no TLS, the certificates of all authorities need not be read, which takes as long as a request.
+    # Without TLS: reading the certificates of all authorities would take as long as a request.
     return {"base_url": url, "headers": headers, "timeout": TIMEOUT_S, "verify": not url.startswith("http://")}
 
 
@@ -528,10 +528,10 @@ def _split(stream: bytes) -> list[bytes]:
     return stream.split(b"\n")
 
 
-def _wanted(form: FormatName, camera: str | None, lens: LensChoice) -> dict[str, str]:
+def _export_params(form: FormatName, camera: str | None, lens: LensChoice) -> dict[str, str]:
     # An older service knows no choice of lens, and has the stored one.
-    chosen = {"lens": lens} if lens != "stored" else {}
-    return {"format": form} | chosen | ({"camera": camera} if camera else {})
+    lens_choice = {"lens": lens} if lens != "stored" else {}
+    return {"format": form} | lens_choice | ({"camera": camera} if camera else {})
 
 
 def _upload(
@@ -539,8 +539,8 @@ def _upload(
 ) -> dict[str, Any]:
     parts: list[tuple[str, tuple[str, bytes, str]]] = [
         (camera, (path.name, path.read_bytes(), "application/octet-stream"))
-        for camera, several in files.items()
-        for path in ([several] if isinstance(several, Path) else several)
+        for camera, paths in files.items()
+        for path in ([paths] if isinstance(paths, Path) else paths)
     ]
     # Never without a part: a form of none is none.
     if options or not parts:

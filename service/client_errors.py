@@ -8,7 +8,7 @@ from typing import Any
 import httpx
 
 NOT_INSTALLED = "/problems/extra-missing"
-# Where a service asks for more time than this (Retry-After), it is asked again all the same.
+# Longest pause before a service is asked again, whatever its Retry-After says.
 LONGEST_PAUSE_S = 60.0
 
 

@@ -137,7 +137,7 @@ def _pixels(pixels: float | None) -> str:
     return "unknown" if pixels is None else f"{pixels:.2f} px"
 
 
-# How a job ended
+# Outcomes of jobs
 
 
 def job_exit_code(job: Job) -> int:

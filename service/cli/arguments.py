@@ -32,7 +32,7 @@ def _or_from_env_file(context: typer.Context, option: typer.CallbackParam, value
     source = context.get_parameter_source(name)
     if (source is not None and source.name != "DEFAULT") or not Path(".env").is_file():
         return value
-    # What reads such files takes longer to load than a command to do its work.
+    # pydantic-settings takes longer to load than a command takes to run.
     from service.cli.env_file import EnvFile
 
     in_file: str | None = getattr(EnvFile(), name)

@@ -47,9 +47,9 @@ def calibrate(
 
     3 as well where only some cameras are accepted. Without frames the service fetches them from the cameras' sources.
     """
-    files, chosen = parse_frame_files(frames or []), parse_options(options)
+    files, job_options = parse_frame_files(frames or []), parse_options(options)
     with open_client(url, api_key) as client:
-        job = client.calibrate(venue, files, chosen.model_dump(mode="json", exclude_unset=True), key)
+        job = client.calibrate(venue, files, job_options.model_dump(mode="json", exclude_unset=True), key)
         if not wait:
             print_submitted(client, job, as_json=as_json)
             return

@@ -83,14 +83,14 @@ def rotate_key(
     length = re.fullmatch(r"(\d{1,5})([mhd])", grace, re.ASCII)
     if length is None:
         fail(f"{grace!r} is no time: a number and m, h or d, such as 30m, 24h or 7d.", USAGE)
-    lasts = int(length[1]) * UNITS[length[2]]
+    grace_time = int(length[1]) * UNITS[length[2]]
     with _known_keys(data) as keys:
-        key = keys.rotate(name, lasts)
+        key = keys.rotate(name, grace_time)
     if key is None:
         fail(f"There is no key {name}; esc key list names those there are.", FAILED)
     _print_key(key)
     print_note(
-        f"The old key is {old_name(name)} now and good until {datetime.now(UTC) + lasts:%Y-%m-%dT%H:%MZ} at most."
+        f"The old key is {old_name(name)} now and good until {datetime.now(UTC) + grace_time:%Y-%m-%dT%H:%MZ} at most."
     )
 
 

@@ -51,7 +51,7 @@ from service.schemas.venue import Venue
 LOOK_AGAIN_S = 2.0
 # For the last report when it is stopped; a service that hangs is not waited for.
 LAST_REPORT_S = 2.0
-# What ran before a restart counts as running for five seconds after its last report.
+# A process counts as running for five seconds after its last report, also one from before a restart.
 OTHERS_AFTER_S, OTHERS_AGAIN_S = 6.0, 30.0
 MULTICAST = "multicast"
 
@@ -148,7 +148,7 @@ def live(
         fail("--hold sends stored poses alone: leave it out, or the streams", USAGE)
     if recover and (Path(venue).is_file() or not addresses):
         fail("--recover has the service calibrate a venue of its own whose cameras are tracked in streams", USAGE)
-    beat = parse_frame_rate(rate, "samples")
+    sample_rate = parse_frame_rate(rate, "samples")
     zooms, focuses = _parse_counts(zoom or [], "--zoom"), _parse_counts(focus or [], "--focus")
     if (zooms or focuses) and not freed:
         fail("--zoom and --focus are sent by FreeD alone: add --freed HOST:PORT", USAGE)
@@ -159,13 +159,13 @@ def live(
         stored = load_venue(venue, url, api_key)
         require_cameras(stored, [*zooms, *focuses])
         service = None if Path(venue).is_file() else (url, api_key)
-        _send(stored, destinations, beat, addresses, follow_every, predict / 1000, service, recover=recover)
+        _send(stored, destinations, sample_rate, addresses, follow_every, predict / 1000, service, recover=recover)
 
 
 def _send(
     stored: Venue,
     destinations: Mapping[str, Destination],
-    beat: Fraction,
+    sample_rate: Fraction,
     addresses: Mapping[str, str],
     every: int,
     ahead_s: float,
@@ -180,7 +180,7 @@ def _send(
     poses, stop, unread = StoredPoses(stored), threading.Event(), threading.Event()
     troubles = {name: OngoingTrouble() for name in destinations}
 
-    def tell(name: str, error: OSError | None) -> None:
+    def note_delivery(name: str, error: OSError | None) -> None:
         if error is None:
             troubles[name].over(f"Sent to {name} again")
         else:
@@ -190,7 +190,7 @@ def _send(
         unread.set()
         stop.set()
 
-    sender = PoseSender(destinations, tell, end_unread)
+    sender = PoseSender(destinations, note_delivery, end_unread)
     reporter = LiveReporter(poses, addresses, [*destinations])
     streams = TrackedStreams.of(stored, addresses, every, ahead_s, sender, reporter.sent)
     for number in (signal.SIGTERM, signal.SIGINT):
@@ -202,11 +202,11 @@ def _send(
         if recover:
             threading.Thread(target=_recover, args=(stored.id, streams, *service, stop), daemon=True).start()
     cameras = ", ".join(f"{camera.id} (source {n})" for n, camera in enumerate(stored.cameras, 1))
-    print_note(f"Sending the poses of venue {stored.id}, stored ones {float(beat):g} times a second: {cameras}")
+    print_note(f"Sending the poses of venue {stored.id}, stored ones {float(sample_rate):g} times a second: {cameras}")
     streams.start()
     for thread in reports:
         thread.start()
-    send_stored_poses(poses, sender, beat, stop, streams.is_tracked)
+    send_stored_poses(poses, sender, sample_rate, stop, streams.is_tracked)
     streams.stop()
     for thread in reports:
         thread.join(LAST_REPORT_S)
@@ -216,7 +216,7 @@ def _send(
 
 
 def _report(reporter: LiveReporter, url: str, api_key: str | None, stop: threading.Event) -> None:
-    """Tell the service how the poses that are sent are doing, until stopped."""
+    """Report the state of the live poses to the service, until stopped."""
     trouble = OngoingTrouble()
     with Client(url, api_key) as client:
         reporter.run(
@@ -235,10 +235,7 @@ def _ask_for_poses(
     api_key: str | None,
     stop: threading.Event,
 ) -> None:
-    """Ask for the venue's poses again and again; where the service does not answer, the last ones stay in use.
-
-    Now and then it asks as well who else sends poses of the venue.
-    """
+    """Poll the service for new poses, which replace those in use, and for other senders of the venue, until stopped."""
     trouble, company, venue = OngoingTrouble(), OngoingTrouble(), poses.venue.id
     look_for_others_s = time.monotonic() + OTHERS_AFTER_S
     with Client(url, api_key) as client:
@@ -274,7 +271,7 @@ def _recover(venue: str, streams: TrackedStreams, url: str, api_key: str | None,
 
 
 class _RecoveryNotes:
-    """Prints how calibrations of lost cameras go; why they change nothing, once for each reason."""
+    """Print the calibrations of lost cameras; of those that change nothing, each reason once in a row."""
 
     def __init__(self) -> None:
         self._trouble = OngoingTrouble()

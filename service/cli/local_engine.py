@@ -31,7 +31,7 @@ def checked_files(stored: Venue, frames: Sequence[str], settings: Settings) -> d
     """Return the frames of each camera, checked as the service checks an upload."""
     files = {camera: [path.read_bytes() for path in paths] for camera, paths in parse_frame_files(frames).items()}
     with report_job_failures():
-        image_checks.check_cameras(stored, {camera: len(several) for camera, several in files.items()}, settings)
+        image_checks.check_cameras(stored, {camera: len(images) for camera, images in files.items()}, settings)
         budget = image_checks.PixelBudget(settings)
         for camera in stored.cameras:
             for data in files[camera.id]:

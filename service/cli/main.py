@@ -64,7 +64,7 @@ def _flush_output() -> None:
         if sys.stdout is not None:
             sys.stdout.flush()
     except BrokenPipeError:
-        # What is still to be written goes nowhere.
+        # The rest of the output is discarded.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
@@ -108,8 +108,8 @@ class LazyCommands(TyperGroup):
             raise
 
 
-def _print_version(asked: bool) -> None:
-    if asked:
+def _print_version(wanted: bool) -> None:
+    if wanted:
         print(f"esc {build.description()}")
         raise typer.Exit
 

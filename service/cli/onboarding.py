@@ -163,32 +163,34 @@ def pose(
     engine_settings()
     place = parse_document(Site, site.read_bytes(), str(site))
     clicks = parse_document(ClickedPoints, points.read_bytes(), str(points)).root
-    given = {
+    lens_files = {
         camera: parse_document(LensFile, path.read_bytes(), str(path), LENS_EXAMPLE)
         for camera, (path, *_) in parse_frame_files(lenses).items()
     }
-    seen = {camera: path.read_bytes() for camera, (path, *_) in parse_frame_files(frame or []).items()}
-    for camera in given.keys() - clicks.keys():
+    images = {camera: path.read_bytes() for camera, (path, *_) in parse_frame_files(frame or []).items()}
+    for camera in lens_files.keys() - clicks.keys():
         fail(f"{points} has no points of camera {camera}, only of {', '.join(clicks)}", USAGE)
     from worker.jobs.from_schemas import JobFailedError, lens_of
     from worker.jobs.locate_all import locate_all
 
-    engine_lenses = {camera: lens_of(lens.intrinsics, lens.image_size) for camera, lens in given.items()}
+    engine_lenses = {camera: lens_of(lens.intrinsics, lens.image_size) for camera, lens in lens_files.items()}
     stored = {camera.id: Pose.from_input(camera.pose) for camera in place.cameras}
     found = {camera.id: camera for camera in place.cameras}
     results, failures = [], []
-    for camera, end in locate_all(place.field, engine_lenses, clicks, seen, stored).items():
-        if isinstance(end, JobFailedError):
-            failures.append(str(end))
+    for camera, outcome in locate_all(place.field, engine_lenses, clicks, images, stored).items():
+        if isinstance(outcome, JobFailedError):
+            failures.append(str(outcome))
             continue
-        result = end.result
+        result = outcome.result
         results.append(result)
         print_pose_summary(result)
         if pictures is not None:
-            write_pictures(pictures, {f"points_{camera}": end.pictures["points"]})
-        stands = PoseIn(rotation=result.pose.rotation, position=result.pose.position)
+            write_pictures(pictures, {f"points_{camera}": outcome.pictures["points"]})
+        pose_in = PoseIn(rotation=result.pose.rotation, position=result.pose.position)
         if result.accepted:
-            found[camera] = CameraIn(id=camera, image_size=result.image_size, intrinsics=result.intrinsics, pose=stands)
+            found[camera] = CameraIn(
+                id=camera, image_size=result.image_size, intrinsics=result.intrinsics, pose=pose_in
+            )
     if failures:
         fail("\n".join(failures), FAILED)
     if as_json or not sys.stdout.isatty():

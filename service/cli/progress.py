@@ -30,6 +30,6 @@ def progress_bar() -> Iterator[Callable[[str, float], None]]:
     """Show a progress bar on a terminal; yields what takes the name of the stage and the fraction that is done."""
     console = Console(stderr=True, soft_wrap=True, highlight=False, markup=False)
     columns = (TextColumn("{task.description:<14}"), BarColumn(), TextColumn("{task.percentage:3.0f} %"))
-    with Progress(*columns, TimeElapsedColumn(), console=console, disable=not console.is_terminal) as shown:
-        line = shown.add_task("waiting", total=1.0)
-        yield lambda stage, fraction: shown.update(line, completed=fraction, description=stage)
+    with Progress(*columns, TimeElapsedColumn(), console=console, disable=not console.is_terminal) as bar:
+        line = bar.add_task("waiting", total=1.0)
+        yield lambda stage, fraction: bar.update(line, completed=fraction, description=stage)

@@ -38,8 +38,8 @@ def run(
     as_json: AnswerAsJson = False,
 ) -> None:
     """Calibrate a venue's file by frames, without a service. Exit codes as of `calibrate`."""
-    settings, chosen = engine_settings(), parse_options(options)
-    if chosen.callback_url is not None:
+    settings, job_options = engine_settings(), parse_options(options)
+    if job_options.callback_url is not None:
         print_note("callback_url is not used: without a service nobody is told. The exit code says how it went.")
     from worker.calibration.records import NOT_RECORDED
     from worker.compute_resources import ComputeResources
@@ -47,9 +47,9 @@ def run(
     from worker.jobs.debugging import DebugRecorder
 
     stored = parse_document(VenueIn, venue.read_bytes(), str(venue)).to_venue()
-    if chosen.seed is None:
-        chosen = chosen.model_copy(update={"seed": secrets.randbelow(2**31)})
-    chosen = chosen.model_copy(update={"pictures": True})
+    if job_options.seed is None:
+        job_options = job_options.model_copy(update={"seed": secrets.randbelow(2**31)})
+    job_options = job_options.model_copy(update={"pictures": True})
     files = checked_files(stored, frames, settings)
     resources, recorder = ComputeResources.of(settings), NOT_RECORDED if debug is None else DebugRecorder()
     try:
@@ -57,7 +57,7 @@ def run(
             solution = calibration.solve(
                 inputs.read_record(inputs.Venue, stored.model_dump(mode="json")),
                 files,
-                inputs.read_record(inputs.Options, chosen.model_dump(mode="json")),
+                inputs.read_record(inputs.Options, job_options.model_dump(mode="json")),
                 resources,
                 show,
                 recorder=recorder,

@@ -37,7 +37,7 @@ def open_client(url: str, api_key: str | None) -> Iterator[Client]:
     except (httpx.InvalidURL, httpx.UnsupportedProtocol) as error:
         fail(f"--url (ESC_URL) is no address such as http://127.0.0.1:8000: {error}", USAGE)
     except httpx.TransportError as error:
-        # It may be starting again.
+        # The service may be restarting.
         fail(f"The service at {url} cannot be reached: {error or type(error).__name__}", BUSY)
 
 

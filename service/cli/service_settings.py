@@ -16,25 +16,25 @@ from service.settings import Settings, setting_names, unread_variables
 from service.variable_names import OF_CLIENTS, suggestion
 
 
-def load_settings(**given: Any) -> Settings:
+def load_settings(**options: Any) -> Settings:
     """Return the settings of a service on this machine and set up its log, or exit with a line for each error.
 
-    `given`: values of the command line, which go before the environment; None: not given.
+    `options`: values of the command line, which go before the environment; None: not given.
     """
     _refuse_unread_variables()
     try:
         bucket_credentials(os.environ)
-        settings = Settings(**{name: value for name, value in given.items() if value is not None})
+        settings = Settings(**{name: value for name, value in options.items() if value is not None})
     except ValidationError as error:
-        options = {name for name, value in given.items() if value is not None}
+        from_options = {name for name, value in options.items() if value is not None}
         lines = []
         for finding in describe_errors(error.errors(), None, None):
             name, _, message = finding.partition(": ")
-            setting = f"--{name.removeprefix('worker_')}" if name in options else f"ESC_{name.upper()}"
+            setting = f"--{name.removeprefix('worker_')}" if name in from_options else f"ESC_{name.upper()}"
             lines.append(f"{setting}: {message}")
         fail("\n".join(lines), USAGE)
     except SettingsError as error:
-        # Of a list that is no JSON; the error names its field and nothing else.
+        # Raised for a list that is no JSON; the error names its field and nothing else.
         name = str(error).partition('field "')[2].partition('"')[0].upper()
         fail(f'ESC_{name}: expected a list in JSON, for instance ["127.0.0.1"]', USAGE)
     except SecretFileError as error:

@@ -123,7 +123,7 @@ def stitch(
             offset or [], "CAMERA=SECONDS, for instance right=0.120 or right=3f"
         ).items()
     }
-    chosen: dict[str, Any] = {
+    view: dict[str, Any] = {
         "projection": projection,
         "width": width,
         "height": _parse_number_or_auto(height, "--height", 64, 8192),
@@ -131,7 +131,7 @@ def stitch(
         "pan_deg": pan,
         "horizon": _parse_number_or_auto(horizon, "--horizon", -3, 3),
     }
-    if any(isinstance(chosen[side], float | int) and chosen[side] % 2 for side in ("width", "height")):
+    if any(isinstance(view[side], float | int) and view[side] % 2 for side in ("width", "height")):
         fail("--width and --height are even numbers: video takes no others", USAGE)
     stored = load_venue(venue, url, api_key)
     settings = engine_settings()
@@ -149,9 +149,16 @@ def stitch(
         allow_missing,
         Encoding(codec, crf, preset),
     )
-    view = {name: None if value == AUTO else value for name, value in chosen.items() if value is not None}
+    changes = {name: None if value == AUTO else value for name, value in view.items() if value is not None}
     clip_stitching.stitch_clips(
-        stored, addresses, plan, view, follow_every if follow else None, poses_out, settings.freed_axes, as_json=as_json
+        stored,
+        addresses,
+        plan,
+        changes,
+        follow_every if follow else None,
+        poses_out,
+        settings.freed_axes,
+        as_json=as_json,
     )
 
 

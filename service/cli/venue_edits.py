@@ -17,7 +17,7 @@ from service.schemas.geometry import Pose
 from service.schemas.history import Revision
 from service.schemas.venue import Camera, Venue, VenueIn
 
-# Of a rotation in radians and a position in metres.
+# Distance of two poses, of rotations in radians and positions in metres, that counts as none.
 POSE_TOLERANCE = 1e-9
 
 
@@ -29,10 +29,10 @@ def describe_losses(venue: Venue, stored: Venue, newest: Revision) -> list[str]:
 def _lost_poses(venue: Venue, stored: Venue, newest: Revision) -> list[str]:
     if newest.cause == "put":
         return []
-    wanted = {camera.id: camera.pose for camera in venue.cameras}
-    others = [camera for camera in stored.cameras if _differ(camera.pose, wanted.get(camera.id))]
+    poses = {camera.id: camera.pose for camera in venue.cameras}
+    changed = [camera for camera in stored.cameras if _differ(camera.pose, poses.get(camera.id))]
     since = f"{newest.cause} {newest.at:%Y-%m-%d %H:%M} UTC, revision {newest.revision}"
-    return [f"the pose of camera {camera.id} ({since}); {_pose_difference_text(camera, wanted)}" for camera in others]
+    return [f"the pose of camera {camera.id} ({since}); {_pose_difference_text(camera, poses)}" for camera in changed]
 
 
 def _differ(pose: Pose, other: Pose | None) -> bool:
@@ -40,10 +40,10 @@ def _differ(pose: Pose, other: Pose | None) -> bool:
     return other is None or math.dist(pose.rotation + pose.position, other.rotation + other.position) > POSE_TOLERANCE
 
 
-def _pose_difference_text(camera: Camera, wanted: Mapping[str, Pose]) -> str:
-    if camera.id not in wanted:
+def _pose_difference_text(camera: Camera, poses: Mapping[str, Pose]) -> str:
+    if camera.id not in poses:
         return "the file has no such camera"
-    metres = math.dist(camera.pose.position, wanted[camera.id].position)
+    metres = math.dist(camera.pose.position, poses[camera.id].position)
     return f"by the file it stands {metres:.3f} m from there"
 
 
@@ -86,15 +86,15 @@ def parse_patch(changes: Sequence[str]) -> dict[str, Any]:
     patch: dict[str, Any] = {}
     for change in changes:
         path, equals, text = change.partition("=")
-        *way, last = path.split(".")
-        if not (equals and all((*way, last))):
+        *parents, name = path.split(".")
+        if not (equals and all((*parents, name))):
             fail(f"{change!r} is not PART=VALUE, for instance alarms.rejected_in_a_row=3", USAGE)
-        place = patch
-        for step in way:
-            place = place.setdefault(step, {})
-            if not isinstance(place, dict):
-                fail(f"{change!r}: {step} has another value already", USAGE)
-        place[last] = _parse_value(text)
+        part = patch
+        for parent in parents:
+            part = part.setdefault(parent, {})
+            if not isinstance(part, dict):
+                fail(f"{change!r}: {parent} has another value already", USAGE)
+        part[name] = _parse_value(text)
     return patch
 
 
@@ -103,9 +103,9 @@ def merge_patch_between(before: Any, after: Any) -> Any:
     before, after = _by_id(before), _by_id(after)
     if not (isinstance(before, dict) and isinstance(after, dict)):
         return after
-    gone = dict.fromkeys(before.keys() - after.keys())
-    others = {name: value for name, value in after.items() if name not in before or before[name] != value}
-    return gone | {name: merge_patch_between(before.get(name), value) for name, value in others.items()}
+    removed = dict.fromkeys(before.keys() - after.keys())
+    changed = {name: value for name, value in after.items() if name not in before or before[name] != value}
+    return removed | {name: merge_patch_between(before.get(name), value) for name, value in changed.items()}
 
 
 def _by_id(document: Any) -> Any:

@@ -116,10 +116,10 @@ def find_cameras(
     Nothing is stored before --adopt, or `esc venue adopt VENUE --found JOB`.
     """
     files = parse_frame_files(frames)
-    chosen = parse_document(FindOptions, options, "--options")
+    find_options = parse_document(FindOptions, options, "--options")
     sought = _sought_site(venue, files, sport, site)
     with open_client(url, api_key) as client:
-        job = client.find(venue, files, chosen.model_dump(mode="json", exclude_unset=True), sought, key)
+        job = client.find(venue, files, find_options.model_dump(mode="json", exclude_unset=True), sought, key)
         if not (wait or adopt_them or pictures):
             print_submitted(client, job, as_json=as_json)
             return
@@ -191,10 +191,10 @@ def _sought_site(
 
 def _parse_candidates(choices: Sequence[str]) -> dict[str, int | None]:
     """Return the number of the candidate of each camera, from arguments CAMERA=NUMBER; None: none of them."""
-    chosen: dict[str, int | None] = {}
+    candidates: dict[str, int | None] = {}
     for choice in choices:
         camera, equals, number = choice.partition("=")
         if not (camera and equals and number.isdecimal()):
             fail(f"{choice!r} is not CAMERA=NUMBER, for instance right=2", USAGE)
-        chosen[camera] = int(number) or None
-    return chosen
+        candidates[camera] = int(number) or None
+    return candidates

@@ -67,11 +67,11 @@ def put_venue(
             print_answer(client.put_venue(venue), as_json=as_json)
             return
         stored, tag = before
-        wanted = with_poses_of(venue, stored) if keep_poses else venue
-        lost = describe_losses(wanted.to_venue(), stored, client.history(venue.id, 1)[0])
-        if lost and not force:
-            fail("\n  ".join([f"Nothing was put. Venue {venue.id} would lose", *lost, WAYS_TO_PUT]), FAILED)
-        print_answer(client.put_venue(wanted, tag), as_json=as_json)
+        new = with_poses_of(venue, stored) if keep_poses else venue
+        losses = describe_losses(new.to_venue(), stored, client.history(venue.id, 1)[0])
+        if losses and not force:
+            fail("\n  ".join([f"Nothing was put. Venue {venue.id} would lose", *losses, WAYS_TO_PUT]), FAILED)
+        print_answer(client.put_venue(new, tag), as_json=as_json)
 
 
 @app.command("set")
@@ -100,9 +100,9 @@ def edit_venue(venue: VenueId, as_json: AnswerAsJson = False, url: Url = DEFAULT
     """Open a venue in $EDITOR and change what was changed there, unless somebody else has changed it meanwhile."""
     with open_client(url, api_key) as client:
         stored, tag = client.tagged_venue(venue)
-        shown = stored.to_input().model_dump(mode="json", exclude_none=True)
+        document = stored.to_input().model_dump(mode="json", exclude_none=True)
         try:
-            patch = merge_patch_between(shown, json.loads(edit_text(json.dumps(shown, indent=2) + "\n")))
+            patch = merge_patch_between(document, json.loads(edit_text(json.dumps(document, indent=2) + "\n")))
         except ValueError as error:
             fail(f"Nothing was changed. What was saved is no JSON: {error}", USAGE)
         if not patch:
@@ -184,7 +184,7 @@ def venue_stitch(
     """
     if if_changed and output is None:
         fail("--if-changed needs -o FILE, the zip that may still be up to date", USAGE)
-    known = package_etag(output) if if_changed and output is not None else None
+    etag = package_etag(output) if if_changed and output is not None else None
     parts = {
         "projection": projection,
         "width_px": width,
@@ -193,9 +193,9 @@ def venue_stitch(
         "pan_deg": pan,
         "horizon": horizon,
     }
-    wanted = {name: value for name, value in parts.items() if value is not None}
+    view = {name: value for name, value in parts.items() if value is not None}
     with open_client(url, api_key) as client:
-        package = client.venue_stitch(venue, form, wanted, known)
+        package = client.venue_stitch(venue, form, view, etag)
     if package is None:
         print_note(f"{output} is up to date.")
     else:
