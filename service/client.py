@@ -71,6 +71,7 @@ PACKAGE_S = 180.0
 # A report is out of date by then.
 REPORT_S = 5.0
 NOTHING: Mapping[str, Any] = MappingProxyType({})
+Answer = TypeVar("Answer", bound=BaseModel)
 
 
 class AsyncClient:
@@ -96,15 +97,13 @@ class AsyncClient:
         # A service need not know a field that has its default.
         content = venue.model_dump(mode="json", exclude_defaults=True)
         headers = {"If-Match": if_match} if if_match else {}
-        answer = await self._ask("PUT", f"/venues/{venue.id}", json=content, headers=headers)
-        return _read(ChangedVenue, answer)
+        return await self._call(ChangedVenue, "PUT", f"/venues/{venue.id}", json=content, headers=headers)
 
     async def patch_venue(self, venue_id: str, patch: Mapping[str, Any], if_match: str | None = None) -> ChangedVenue:
         """Change parts of a venue by a JSON merge patch; cameras may be an object of their ids."""
         headers = {"Content-Type": MERGE_PATCH} | ({"If-Match": if_match} if if_match else {})
         content = json.dumps(patch).encode()
-        answer = await self._ask("PATCH", f"/venues/{venue_id}", content=content, headers=headers)
-        return _read(ChangedVenue, answer)
+        return await self._call(ChangedVenue, "PATCH", f"/venues/{venue_id}", content=content, headers=headers)
 
     async def tagged_venue(self, venue_id: str) -> tuple[Venue, str]:
         """Return a venue and its tag, for `if_match`."""
@@ -113,7 +112,7 @@ class AsyncClient:
 
     async def venue(self, venue_id: str) -> Venue:
         """Return a venue with its stored poses."""
-        return _read(Venue, await self._ask("GET", f"/venues/{venue_id}"))
+        return await self._call(Venue, "GET", f"/venues/{venue_id}")
 
     async def venues(self) -> list[Venue]:
         """Return all venues that the service can read, see `venue_list`."""
@@ -121,10 +120,10 @@ class AsyncClient:
 
     async def venue_list(self) -> Venues:
         """Return all venues on one page, those that are stored and cannot be read as well."""
-        page = _read(Venues, await self._ask("GET", "/venues"))
+        page = await self._call(Venues, "GET", "/venues")
         found, unreadable = page.venues, page.unreadable
         while page.next_cursor is not None:
-            page = _read(Venues, await self._ask("GET", "/venues", params={"cursor": page.next_cursor}))
+            page = await self._call(Venues, "GET", "/venues", params={"cursor": page.next_cursor})
             found += page.venues
             unreadable += page.unreadable
         return Venues(venues=found, unreadable=unreadable)
@@ -135,37 +134,35 @@ class AsyncClient:
 
     async def venue_health(self, venue_id: str) -> VenueHealth:
         """Return the alarms of a venue, the drift of its cameras and its schedule."""
-        return _read(VenueHealth, await self._ask("GET", f"/venues/{venue_id}/health"))
+        return await self._call(VenueHealth, "GET", f"/venues/{venue_id}/health")
 
     async def history(self, venue_id: str, most: int | None = None) -> list[Revision]:
         """Return the changes of a venue's poses, newest first; `most`: so many of them."""
         address = f"/venues/{venue_id}/history"
-        page = _read(History, await self._ask("GET", address))
+        page = await self._call(History, "GET", address)
         found = page.revisions
         while page.next_cursor is not None and (most is None or len(found) < most):
-            page = _read(History, await self._ask("GET", address, params={"cursor": page.next_cursor}))
+            page = await self._call(History, "GET", address, params={"cursor": page.next_cursor})
             found += page.revisions
         return found[:most]
 
     async def trend(self, venue_id: str, camera: str, since: date | None = None) -> Trend:
         """Return how a camera has moved since its anchor, night by night; `since`: the first night."""
         params = {"since": since.isoformat()} if since else {}
-        answer = await self._ask("GET", f"/venues/{venue_id}/cameras/{camera}/trend", params=params)
-        return _read(Trend, answer)
+        return await self._call(Trend, "GET", f"/venues/{venue_id}/cameras/{camera}/trend", params=params)
 
     async def restore(self, venue_id: str, revision: int) -> RestoredVenue:
         """Put the poses of a revision to use again, and say what was lost by it."""
-        answer = await self._ask("POST", f"/venues/{venue_id}/restore", json={"revision": revision})
-        return _read(RestoredVenue, answer)
+        return await self._call(RestoredVenue, "POST", f"/venues/{venue_id}/restore", json={"revision": revision})
 
     async def adopt_refined(self, venue_id: str, camera: str) -> Venue:
         """Store the refined pose and lens of a camera that the last accepted calibration found."""
-        return _read(Venue, await self._ask("POST", f"/venues/{venue_id}/cameras/{camera}/adopt-refined"))
+        return await self._call(Venue, "POST", f"/venues/{venue_id}/cameras/{camera}/adopt-refined")
 
     async def adopt_field(self, venue_id: str, job_id: str, name: FieldNumber) -> Venue:
         """Store a number of the field as the lines of a calibration have it, of those in `adoptable` of its result."""
         document = {"job": job_id, "name": name}
-        return _read(Venue, await self._ask("POST", f"/venues/{venue_id}/adopt-field", json=document))
+        return await self._call(Venue, "POST", f"/venues/{venue_id}/adopt-field", json=document)
 
     async def adopt_found(self, venue_id: str, job_id: str, candidates: Mapping[str, int | None] = NOTHING) -> Venue:
         """Store the cameras that a job has found, as a new venue or as a revision.
@@ -174,7 +171,7 @@ class AsyncClient:
         the first one that was accepted.
         """
         document = {"job": job_id, "candidates": dict(candidates)}
-        return _read(Venue, await self._ask("POST", f"/venues/{venue_id}/adopt-found", json=document))
+        return await self._call(Venue, "POST", f"/venues/{venue_id}/adopt-found", json=document)
 
     async def venue_poses(
         self, venue_id: str, form: FormatName, camera: str | None = None, lens: LensChoice = "stored"
@@ -247,12 +244,12 @@ class AsyncClient:
 
     async def live(self, venue_id: str) -> LiveState:
         """Return the newest report of each process that sends live poses of a venue."""
-        return _read(LiveState, await self._ask("GET", f"/venues/{venue_id}/live"))
+        return await self._call(LiveState, "GET", f"/venues/{venue_id}/live")
 
     async def live_history(self, venue_id: str, minutes: int = 60) -> LiveHistory:
         """Return the reports of live poses in the last `minutes`, by the minute."""
         params = {"minutes": minutes}
-        return _read(LiveHistory, await self._ask("GET", f"/venues/{venue_id}/live/history", params=params))
+        return await self._call(LiveHistory, "GET", f"/venues/{venue_id}/live/history", params=params)
 
     async def snapshot(self, venue_id: str, camera: str) -> bytes:
         """Return what a camera shows now, a JPEG or PNG from its source."""
@@ -272,7 +269,7 @@ class AsyncClient:
         The job may be an older one if the content is the same.
         """
         sent = _upload(files, options, idempotency_key)
-        return _job(await self._ask("POST", f"/venues/{venue_id}/calibrate", **sent))
+        return await self._call(Job, "POST", f"/venues/{venue_id}/calibrate", **sent)
 
     async def fit_field(
         self,
@@ -283,7 +280,7 @@ class AsyncClient:
     ) -> Job:
         """Submit frames by which to fit the measures of a venue's pitch; the venue stays as it is."""
         sent = _upload(files, options, idempotency_key)
-        return _job(await self._ask("POST", f"/venues/{venue_id}/field/fit", **sent))
+        return await self._call(Job, "POST", f"/venues/{venue_id}/field/fit", **sent)
 
     async def find(
         self,
@@ -301,12 +298,12 @@ class AsyncClient:
         if site is not None:
             document = site.model_dump_json(exclude_defaults=True).encode()
             sent["files"].append((SITE_PART, ("site.json", document, "application/json")))
-        return _job(await self._ask("POST", f"/venues/{venue_id}/find", **sent))
+        return await self._call(Job, "POST", f"/venues/{venue_id}/find", **sent)
 
     async def job(self, job_id: str, wait_s: float = 0) -> Job:
         """Return a job, at its end or after `wait_s`."""
         params = {"wait": wait_s} if wait_s else {}
-        return _job(await self._ask("GET", f"/jobs/{job_id}", params=params))
+        return await self._call(Job, "GET", f"/jobs/{job_id}", params=params)
 
     async def jobs(
         self,
@@ -317,21 +314,21 @@ class AsyncClient:
     ) -> list[Job]:
         """Return jobs, newest first: of one venue, in one state, of one kind; `most`: so many of them."""
         filters = {name: value for name, value in (("venue", venue), ("status", status), ("kind", kind)) if value}
-        page = _read(Jobs, await self._ask("GET", "/jobs", params=filters))
+        page = await self._call(Jobs, "GET", "/jobs", params=filters)
         found = page.jobs
         while page.next_cursor is not None and (most is None or len(found) < most):
             more = filters | {"cursor": page.next_cursor}
-            page = _read(Jobs, await self._ask("GET", "/jobs", params=more))
+            page = await self._call(Jobs, "GET", "/jobs", params=more)
             found += page.jobs
         return found[:most]
 
     async def again(self, job_id: str) -> Job:
         """Submit the frames of a job once more, from the poses in use: another job."""
-        return _job(await self._ask("POST", f"/jobs/{job_id}/again"))
+        return await self._call(Job, "POST", f"/jobs/{job_id}/again")
 
     async def calibrate_found(self, job_id: str) -> Job:
         """Calibrate a venue with the frames of the search whose cameras `adopt_found` has stored."""
-        return _job(await self._ask("POST", f"/jobs/{job_id}/calibrate"))
+        return await self._call(Job, "POST", f"/jobs/{job_id}/calibrate")
 
     async def delete_job(self, job_id: str) -> None:
         """Forget a job that has ended, with its frames and pictures."""
@@ -339,16 +336,16 @@ class AsyncClient:
 
     async def cancel(self, job_id: str) -> Job:
         """End a job."""
-        return _job(await self._ask("POST", f"/jobs/{job_id}/cancel"))
+        return await self._call(Job, "POST", f"/jobs/{job_id}/cancel")
 
     async def accept(self, job_id: str, camera: str | None = None) -> Job:
         """Put the poses that a calibration found to use, of one camera or all, whatever the gate said."""
         params = {"camera": camera} if camera else {}
-        return _job(await self._ask("POST", f"/jobs/{job_id}/accept", params=params))
+        return await self._call(Job, "POST", f"/jobs/{job_id}/accept", params=params)
 
     async def reject(self, job_id: str) -> Job:
         """Put back what was before the poses of a calibration."""
-        return _job(await self._ask("POST", f"/jobs/{job_id}/reject"))
+        return await self._call(Job, "POST", f"/jobs/{job_id}/reject")
 
     async def job_poses(
         self, job_id: str, form: FormatName, camera: str | None = None, lens: LensChoice = "stored"
@@ -376,6 +373,10 @@ class AsyncClient:
         return followed
 
     # Requests
+
+    async def _call(self, model: type[Answer], method: str, path: str, **more: Any) -> Answer:
+        """Return a successful answer as a model; raises `Refused` for others."""
+        return _read(model, await self._ask(method, path, **more))
 
     async def _ask(self, method: str, path: str, **more: Any) -> bytes:
         """Return the body of a successful answer; raises `Refused` for others."""
@@ -487,13 +488,6 @@ def _connection(url: str, api_key: str | None) -> dict[str, Any]:
     headers = {"Authorization": f"Bearer {api_key}"} if api_key else {}
     # Without TLS: reading the certificates of all authorities would take as long as a request.
     return {"base_url": url, "headers": headers, "timeout": TIMEOUT_S, "verify": not url.startswith("http://")}
-
-
-def _job(answer: bytes) -> Job:
-    return _read(Job, answer)
-
-
-Answer = TypeVar("Answer", bound=BaseModel)
 
 
 def _read(model: type[Answer], answer: bytes) -> Answer:
