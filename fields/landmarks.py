@@ -16,7 +16,7 @@ MISSPELT = 0.8
 
 
 class UnknownLandmark(ValueError):  # noqa: N818
-    """No point of the field has this name; `near` are names that are like it."""
+    """Raised when no point of the field has this name; `near` are similar names."""
 
     def __init__(self, name: str, near: list[str]) -> None:
         super().__init__(f"no point is called {name!r}" + (f"; near it: {'; '.join(near)}" if near else ""))
@@ -25,21 +25,21 @@ class UnknownLandmark(ValueError):  # noqa: N818
 
 
 def find(name: str, template: Template, size: Mapping[str, float]) -> Point:
-    """Where the point of this name is, whatever its case, spaces and punctuation. Raises `UnknownLandmark`.
+    """Return the place of a named point, whatever the case, spaces and punctuation; raises `UnknownLandmark`.
 
-    In a name such as `near touchline, 22 m from the left goal line` any number may stand.
+    A name such as `near touchline, 22 m from the left goal line` may have any number.
     """
     places = {_plain(known): (known, point) for known, point in template.places(size).items()}
     wanted = _plain(name)
     if wanted in places:
         return places[wanted][1]
     number = NUMBER.search(wanted)
-    measured = {_plain(known): known for known in template.places_at(size, 0.0)}
+    open_names = {_plain(known): known for known in template.places_at(size, 0.0)}
     if number is not None:
-        open_name = measured.get(f"{wanted[: number.start()]}distance{wanted[number.end() :]}")
+        open_name = open_names.get(f"{wanted[: number.start()]}distance{wanted[number.end() :]}")
         if open_name is not None:
             return template.places_at(size, float(number.group()))[open_name]
-    raise UnknownLandmark(name, _like(wanted, {plain: known for plain, (known, _) in places.items()} | measured))
+    raise UnknownLandmark(name, _like(wanted, {plain: known for plain, (known, _) in places.items()} | open_names))
 
 
 def _like(wanted: str, names: Mapping[str, str]) -> list[str]:
@@ -57,6 +57,6 @@ def _words_shared(wanted: list[str], name: list[str]) -> int:
 
 
 def _plain(name: str) -> str:
-    """Small letters, digits and single spaces, as the English write centre."""
+    """Return a name in small letters, digits and single spaces, with `centre` for `center`."""
     words = re.findall(r"\d+\.\d+|[^\W_]+", name.casefold())
     return " ".join("centre" if word == "center" else word for word in words)

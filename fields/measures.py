@@ -18,7 +18,7 @@ FUNCTIONS: dict[str, Callable[..., float]] = {"sqrt": math.sqrt, "min": min}
 
 
 def value(expression: str | float, known: Mapping[str, float]) -> float:
-    """A number, or sums, products, `sqrt` and `min` of numbers and known measures.
+    """Return the value of a number, or of sums, products, `sqrt` and `min` of numbers and known measures.
 
     Raises `ValueError` on anything else, and on a name that is not known.
     """

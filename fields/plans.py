@@ -37,7 +37,7 @@ def markings_of(template: str | Mapping[str, Any], size: Mapping[str, float]) ->
 
 @lru_cache(maxsize=256)
 def _markings_of_template(name: str, size: tuple[tuple[str, float], ...]) -> tuple[Shape, ...]:
-    """Fields are of few sizes, and drawing one takes a thousand times as long as to look it up."""
+    """Return the markings of a template, cached: drawing one takes a thousand times as long as looking it up."""
     return tuple(load(name).markings(dict(size)))
 
 

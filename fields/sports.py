@@ -23,7 +23,7 @@ OTHER_NAMES = {
     "volleyball": ("volley", "indoor volleyball"),
 }
 LONGEST = 40
-"""Characters of a name that are compared: no sport has as many, and what a stranger sends may have millions."""
+"""Largest number of characters of a name that are compared: a stranger may send millions."""
 
 
 def template_name(typed: str) -> str | None:
@@ -38,7 +38,7 @@ def nearest_template_name(typed: str) -> str | None:
 
 
 def _letters(name: str) -> str:
-    """The letters and digits of a name, in small: `Ice Hockey`, `ice_hockey` and `icehockey` are one."""
+    """Return the letters and digits of a name in small: `Ice Hockey`, `ice_hockey` and `icehockey` are one."""
     return "".join(letter for letter in name.casefold() if letter.isalnum())
 
 

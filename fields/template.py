@@ -34,12 +34,15 @@ FILES = Path(__file__).parent
 NAMES = tuple(sorted(path.stem for path in FILES.glob("*.toml")))
 END = "{end}"
 TURF_M = 0.015
-"""How uneven turf is. FIFA's and World Rugby's tests allow a centimetre under a straightedge of three metres."""
+"""Standard deviation of the height of turf.
+
+FIFA's and World Rugby's tests allow a centimetre under a straightedge of three metres.
+"""
 
 
 @dataclass(frozen=True)
 class Extent:
-    """What a length of a field is unless said, and between what it must lie, in metres."""
+    """Default of a length of a field, and its least and largest values, in metres."""
 
     default: float
     least: float
@@ -49,7 +52,7 @@ class Extent:
 
 @dataclass(frozen=True)
 class Template:
-    """A sport's field. `size`: the lengths that a field has of its own, `length`, `width` and `line` among them.
+    """The field of a sport. `size`: the lengths that differ between fields, among them `length`, `width` and `line`.
 
     `uneven`: how far a usual ground of this sport is above or below its plane, or its roof, a standard deviation in
     metres.
@@ -65,14 +68,14 @@ class Template:
     end_points: Mapping[str, Sequence[str | float]] = field(default_factory=dict)
 
     def known(self, size: Mapping[str, float]) -> dict[str, float]:
-        """Every measure by its name: those of `size`, defaults for what is absent there, and what follows from them."""
+        """Return every measure by its name: those of `size`, or their defaults, and those that follow from them."""
         known = {name: extent.default for name, extent in self.size.items()} | dict(size)
         for name, expression in self.measures.items():
             known[name] = value(expression, known)
         return known
 
     def markings(self, size: Mapping[str, float], dashed: Mapping[str, float] | None = None) -> list[Shape]:
-        """All that is painted: what there is once, then the left end, then the right one.
+        """Return all markings: those that are there once, then those of the left end, then of the right one.
 
         `dashed`: a size near this one whose dashes these are, stretched: as many, and each the same one.
         """
@@ -85,17 +88,17 @@ class Template:
         return [*once, *(_at(end, shape) for end in ("left", "right") for shape in left)]
 
     def whole(self, name: str) -> str:
-        """What a marking of `markings` is a part of: the broken line of a dash, the row of a mark, or itself."""
+        """Return the name of the whole marking: the broken line of a dash, the row of a mark, or `name` itself."""
         entries = [entry["name"] for entry in self.marking]
         entries += [entry["name"].replace(END, end) for entry in self.end for end in ("left", "right")]
         return max((one for one in entries if f"{name}, ".startswith(f"{one}, ")), key=len, default=name)
 
     def places(self, size: Mapping[str, float]) -> dict[str, Point]:
-        """Where each named point is, but for those with `{distance}`."""
+        """Return the place of each named point, but for those with `{distance}`."""
         return dict(self._places(self.known(size), measured=False))
 
     def places_at(self, size: Mapping[str, float], distance: float) -> dict[str, Point]:
-        """Where the points with `{distance}` in their names are, by these names."""
+        """Return the places of the points with `{distance}` in their names, by these names."""
         return dict(self._places(self.known(size) | {"distance": distance}, measured=True))
 
     def _places(self, known: Mapping[str, float], *, measured: bool) -> Iterator[tuple[str, Point]]:
@@ -111,7 +114,7 @@ class Template:
 
 @cache
 def load(name: str) -> Template:
-    """The template of this name, one of `NAMES`."""
+    """Return a template by its name, one of `NAMES`."""
     content = tomllib.loads((FILES / f"{name}.toml").read_text())
     return Template(**content | {"size": {key: Extent(**extent) for key, extent in content["size"].items()}})
 

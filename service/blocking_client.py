@@ -1,77 +1,56 @@
-"""The methods of an asynchronous class as those of a blocking one, which has it as `calls`.
+"""Blocking methods made of the coroutines of a class whose connection never waits.
 
 class Client:
-    calls: BlockingCalls  # an AsyncClient whose coroutines never wait
+    calls: BlockingCalls  # an AsyncClient whose coroutines never wait, and so end at their first step
 
-    venue = Call(AsyncClient.venue)
-    venue_events = Stream(AsyncClient.venue_events)
+    venue = blocking(AsyncClient.venue)
+    venue_events = blocking_stream(AsyncClient.venue_events)
 """
 
 from __future__ import annotations
 
 from collections.abc import AsyncGenerator, Awaitable, Callable, Coroutine, Iterator
 from functools import wraps
-from types import MethodType
-from typing import Any, Concatenate, Generic, ParamSpec, Protocol, TypeVar
+from typing import Any, Concatenate, ParamSpec, TypeVar
 
 C = TypeVar("C")
 P = ParamSpec("P")
 T = TypeVar("T")
 
 
-class Blocking(Protocol):
-    """Who has such methods: `calls` is an instance of the class that they come from, and never waits."""
+def blocking(method: Callable[Concatenate[C, P], Coroutine[Any, Any, T]]) -> Callable[Concatenate[Any, P], T]:
+    """Return a method that runs the coroutine of `self.calls` and returns its result."""
 
-    @property
-    def calls(self) -> Any:  # noqa: D102
-        ...
+    @wraps(method)
+    def call(self: Any, /, *arguments: P.args, **named: P.kwargs) -> T:
+        return _run(method(self.calls, *arguments, **named))
 
-
-class Call(Generic[C, P, T]):
-    """A coroutine that is called and has its answer at once."""
-
-    def __init__(self, method: Callable[Concatenate[C, P], Coroutine[Any, Any, T]]) -> None:
-        self._method = method
-
-    def __get__(self, blocking: Blocking, owner: type) -> Callable[P, T]:
-        """Bind it."""
-        awaited: Callable[P, Coroutine[Any, Any, T]] = MethodType(self._method, blocking.calls)
-
-        @wraps(awaited)
-        def method(*arguments: P.args, **named: P.kwargs) -> T:
-            return _at_once(awaited(*arguments, **named))
-
-        return method
+    return call
 
 
-class Stream(Generic[C, P, T]):
-    """An asynchronous generator that is iterated over."""
+def blocking_stream(
+    method: Callable[Concatenate[C, P], AsyncGenerator[T]],
+) -> Callable[Concatenate[Any, P], Iterator[T]]:
+    """Return a method that iterates over the asynchronous generator of `self.calls`."""
 
-    def __init__(self, method: Callable[Concatenate[C, P], AsyncGenerator[T]]) -> None:
-        self._method = method
+    @wraps(method)
+    def iterate(self: Any, /, *arguments: P.args, **named: P.kwargs) -> Iterator[T]:
+        stream = method(self.calls, *arguments, **named)
+        try:
+            while True:
+                try:
+                    item = _run(anext(stream))
+                except StopAsyncIteration:
+                    return
+                yield item
+        finally:
+            _run(stream.aclose())
 
-    def __get__(self, blocking: Blocking, owner: type) -> Callable[P, Iterator[T]]:
-        """Bind it."""
-        awaited: Callable[P, AsyncGenerator[T]] = MethodType(self._method, blocking.calls)
-
-        @wraps(awaited)
-        def method(*arguments: P.args, **named: P.kwargs) -> Iterator[T]:
-            going_on = awaited(*arguments, **named)
-            try:
-                while True:
-                    try:
-                        one = _at_once(anext(going_on))
-                    except StopAsyncIteration:
-                        return
-                    yield one
-            finally:
-                _at_once(going_on.aclose())
-
-        return method
+    return iterate
 
 
-def _at_once(awaitable: Awaitable[T]) -> T:
-    """What something gives that never waits."""
+def _run(awaitable: Awaitable[T]) -> T:
+    """Return the result of an awaitable that never waits."""
     try:
         awaitable.__await__().__next__()
     except StopIteration as end:

@@ -10,34 +10,39 @@
         for seen, event in client.venue_events("demo", ["poses.changed"]):
             print(event.type, event.data)
 
-Both have the same methods. A service that refuses raises `Refused`. Of what a newer service says, fields and events
-that this client does not know are left out, and words that it does not know are handed on as they are. What only some
-methods need is imported there: a command that lists venues takes as long to load it as to be answered.
+Both have the same methods. A service that refuses raises `Refused`. Fields and events of a newer service that this
+client does not know are left out, and words that it does not know are handed on as they are.
 """
 
 from __future__ import annotations
 
+import asyncio
 import json
 import math
 import time
 from collections.abc import AsyncGenerator, Callable, Mapping, Sequence
 from contextlib import aclosing
+from datetime import date
 from functools import cache
 from http import HTTPStatus
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Self, TypeVar
+from typing import Any, Self, TypeVar
 
 import httpx
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
-from service.blocking_client import Call, Stream
+from service.blocking_client import blocking, blocking_stream
 from service.client_errors import NotUnderstood as NotUnderstood
 from service.client_errors import Refused as Refused
-from service.client_errors import passing, pause_s_of, refusal
+from service.client_errors import is_passing, pause_s_of, refusal
 from service.schemas.base import TOLERANTLY
+from service.schemas.events.venue_event import EVENT_TYPES, FINAL_EVENT, Event
+from service.schemas.find import SoughtSite
 from service.schemas.health import VenueHealth
 from service.schemas.history import History, Revision
+from service.schemas.job import Job, Jobs
+from service.schemas.live import LiveHistory, LiveReport, LiveState
 from service.schemas.merge_patch import MEDIA_TYPE as MERGE_PATCH
 from service.schemas.names import (
     OPTIONS_PART,
@@ -50,20 +55,12 @@ from service.schemas.names import (
     LensChoice,
     StitchFormat,
 )
+from service.schemas.trend import Trend
 from service.schemas.venue import ChangedVenue, RestoredVenue, Venue, VenueIn, Venues
-
-if TYPE_CHECKING:
-    from datetime import date
-
-    from service.schemas.events.venue_event import Event
-    from service.schemas.find import SoughtSite
-    from service.schemas.job import Job
-    from service.schemas.live import LiveHistory, LiveReport, LiveState
-    from service.schemas.trend import Trend
 
 # Longer than the longest poll.
 TIMEOUT_S = 75
-# How long a service may be away from somebody who follows a job: a restart, a database that comes back.
+# A service may be away for so long while a job is followed: a restart, a database that comes back.
 PATIENCE_S = 60.0
 # A stream of events says ": ping" every 15 s: one that is silent for longer leads nowhere any more.
 SILENCE_S = 45.0
@@ -71,13 +68,14 @@ SILENCE_S = 45.0
 AGAIN_S = 2.0
 # A view of 8192 pixels and many cameras takes minutes.
 PACKAGE_S = 180.0
-# What is reported is old by then.
+# A report is out of date by then.
 REPORT_S = 5.0
 NOTHING: Mapping[str, Any] = MappingProxyType({})
+Answer = TypeVar("Answer", bound=BaseModel)
 
 
 class AsyncClient:
-    """One service, by its URL; each call is awaited."""
+    """Client of the service at a URL, whose calls are awaited."""
 
     def __init__(self, url: str, api_key: str | None = None) -> None:
         self._http = httpx.AsyncClient(**_connection(url, api_key))
@@ -89,7 +87,7 @@ class AsyncClient:
         await self._http.aclose()
 
     def url_of(self, path: str) -> str:
-        """The address of something the service linked to."""
+        """Return the address of a path that the service linked to."""
         return str(self._http.build_request("GET", path).url)
 
     # Venues
@@ -99,24 +97,22 @@ class AsyncClient:
         # A service need not know a field that has its default.
         content = venue.model_dump(mode="json", exclude_defaults=True)
         headers = {"If-Match": if_match} if if_match else {}
-        answer = await self._ask("PUT", f"/venues/{venue.id}", json=content, headers=headers)
-        return _read(ChangedVenue, answer)
+        return await self._call(ChangedVenue, "PUT", f"/venues/{venue.id}", json=content, headers=headers)
 
     async def patch_venue(self, venue_id: str, patch: Mapping[str, Any], if_match: str | None = None) -> ChangedVenue:
         """Change parts of a venue by a JSON merge patch; cameras may be an object of their ids."""
         headers = {"Content-Type": MERGE_PATCH} | ({"If-Match": if_match} if if_match else {})
         content = json.dumps(patch).encode()
-        answer = await self._ask("PATCH", f"/venues/{venue_id}", content=content, headers=headers)
-        return _read(ChangedVenue, answer)
+        return await self._call(ChangedVenue, "PATCH", f"/venues/{venue_id}", content=content, headers=headers)
 
     async def tagged_venue(self, venue_id: str) -> tuple[Venue, str]:
-        """A venue, and the tag by which to change this one and no other."""
+        """Return a venue and its tag, for `if_match`."""
         response = await self._answer("GET", f"/venues/{venue_id}")
         return _read(Venue, response.content), response.headers["etag"]
 
     async def venue(self, venue_id: str) -> Venue:
-        """A venue with its stored poses."""
-        return _read(Venue, await self._ask("GET", f"/venues/{venue_id}"))
+        """Return a venue with its stored poses."""
+        return await self._call(Venue, "GET", f"/venues/{venue_id}")
 
     async def venues(self) -> list[Venue]:
         """Return all venues that the service can read, see `venue_list`."""
@@ -124,10 +120,10 @@ class AsyncClient:
 
     async def venue_list(self) -> Venues:
         """Return all venues on one page, those that are stored and cannot be read as well."""
-        page = _read(Venues, await self._ask("GET", "/venues"))
+        page = await self._call(Venues, "GET", "/venues")
         found, unreadable = page.venues, page.unreadable
         while page.next_cursor is not None:
-            page = _read(Venues, await self._ask("GET", "/venues", params={"cursor": page.next_cursor}))
+            page = await self._call(Venues, "GET", "/venues", params={"cursor": page.next_cursor})
             found += page.venues
             unreadable += page.unreadable
         return Venues(venues=found, unreadable=unreadable)
@@ -137,40 +133,36 @@ class AsyncClient:
         await self._ask("DELETE", f"/venues/{venue_id}")
 
     async def venue_health(self, venue_id: str) -> VenueHealth:
-        """How a venue is doing: its alarms, the drift of its cameras, its schedule."""
-        return _read(VenueHealth, await self._ask("GET", f"/venues/{venue_id}/health"))
+        """Return the alarms of a venue, the drift of its cameras and its schedule."""
+        return await self._call(VenueHealth, "GET", f"/venues/{venue_id}/health")
 
     async def history(self, venue_id: str, most: int | None = None) -> list[Revision]:
-        """Every change of a venue's poses, newest first; `most`: so many of them."""
+        """Return the changes of a venue's poses, newest first; `most`: so many of them."""
         address = f"/venues/{venue_id}/history"
-        page = _read(History, await self._ask("GET", address))
+        page = await self._call(History, "GET", address)
         found = page.revisions
         while page.next_cursor is not None and (most is None or len(found) < most):
-            page = _read(History, await self._ask("GET", address, params={"cursor": page.next_cursor}))
+            page = await self._call(History, "GET", address, params={"cursor": page.next_cursor})
             found += page.revisions
         return found[:most]
 
     async def trend(self, venue_id: str, camera: str, since: date | None = None) -> Trend:
-        """How a camera has moved since its anchor, night by night; `since`: the first night to tell."""
-        from service.schemas.trend import Trend
-
+        """Return how a camera has moved since its anchor, night by night; `since`: the first night."""
         params = {"since": since.isoformat()} if since else {}
-        answer = await self._ask("GET", f"/venues/{venue_id}/cameras/{camera}/trend", params=params)
-        return _read(Trend, answer)
+        return await self._call(Trend, "GET", f"/venues/{venue_id}/cameras/{camera}/trend", params=params)
 
     async def restore(self, venue_id: str, revision: int) -> RestoredVenue:
         """Put the poses of a revision to use again, and say what was lost by it."""
-        answer = await self._ask("POST", f"/venues/{venue_id}/restore", json={"revision": revision})
-        return _read(RestoredVenue, answer)
+        return await self._call(RestoredVenue, "POST", f"/venues/{venue_id}/restore", json={"revision": revision})
 
     async def adopt_refined(self, venue_id: str, camera: str) -> Venue:
         """Store the refined pose and lens of a camera that the last accepted calibration found."""
-        return _read(Venue, await self._ask("POST", f"/venues/{venue_id}/cameras/{camera}/adopt-refined"))
+        return await self._call(Venue, "POST", f"/venues/{venue_id}/cameras/{camera}/adopt-refined")
 
     async def adopt_field(self, venue_id: str, job_id: str, name: FieldNumber) -> Venue:
         """Store a number of the field as the lines of a calibration have it, of those in `adoptable` of its result."""
-        wanted = {"job": job_id, "name": name}
-        return _read(Venue, await self._ask("POST", f"/venues/{venue_id}/adopt-field", json=wanted))
+        document = {"job": job_id, "name": name}
+        return await self._call(Venue, "POST", f"/venues/{venue_id}/adopt-field", json=document)
 
     async def adopt_found(self, venue_id: str, job_id: str, candidates: Mapping[str, int | None] = NOTHING) -> Venue:
         """Store the cameras that a job has found, as a new venue or as a revision.
@@ -178,19 +170,19 @@ class AsyncClient:
         `candidates`: the number of the one that a camera is taken to be, from 1, None: none of them; of other cameras
         the first one that was accepted.
         """
-        wanted = {"job": job_id, "candidates": dict(candidates)}
-        return _read(Venue, await self._ask("POST", f"/venues/{venue_id}/adopt-found", json=wanted))
+        document = {"job": job_id, "candidates": dict(candidates)}
+        return await self._call(Venue, "POST", f"/venues/{venue_id}/adopt-found", json=document)
 
     async def venue_poses(
         self, venue_id: str, form: FormatName, camera: str | None = None, lens: LensChoice = "stored"
     ) -> bytes:
         """Return the poses in use, of one camera or all, as a file of another tool's format."""
-        return await self._ask("GET", f"/venues/{venue_id}/poses", params=_wanted(form, camera, lens))
+        return await self._ask("GET", f"/venues/{venue_id}/poses", params=_export_params(form, camera, lens))
 
     async def venue_stitch(
         self, venue_id: str, form: StitchFormat, view: Mapping[str, Any] = NOTHING, known: str | None = None
     ) -> bytes | None:
-        """The zip with which other tools stitch; None: that with the tag `known` still holds.
+        """Return the zip with which other tools stitch; None: the one with the tag `known` is up to date.
 
         `view`: what is wanted otherwise than the venue's view has it, such as `width_px`. The tag is in `view.json`.
         """
@@ -210,63 +202,57 @@ class AsyncClient:
         seen: str | None = None,
         patience_s: float = math.inf,
     ) -> AsyncGenerator[tuple[str, Event]]:
-        """Whatever happens to a venue (of these kinds, absent: of any), each with the id by which to go on after it.
+        """Yield the events of a venue (of these kinds, absent: of any), each with its id, for `seen`.
 
-        First comes `poses.current`, or what was missed since the event `seen`. None is missed and none comes twice,
-        whatever breaks meanwhile: what is wrong is raised once the service was away for `patience_s`. A busy service is
-        asked again when it says (Retry-After), at the latest after a minute. Ends when the
-        venue is deleted; where that happened while nobody was connected, with `Refused` (404).
+        The first is `poses.current`, or the one after the event `seen`. No event is missed or repeated when the
+        connection breaks: the error is raised once the service was away for `patience_s`. A busy service is asked again
+        when it says (Retry-After), at the latest after a minute. Ends when the venue is deleted; where that happened
+        while nobody was connected, with `Refused` (404).
         """
-        from service.schemas.events.venue_event import FINAL_EVENT
-
         path, params = f"/venues/{venue_id}/events", {"events": list(kinds)}
-        heard = time.monotonic()
+        last_answer_s = time.monotonic()
         while True:
             pause_s = AGAIN_S
             try:
                 headers = {"Last-Event-ID": seen} if seen else {}
-                told: dict[str, str] = {}
+                fields: dict[str, str] = {}
                 async with aclosing(self._lines(path, params=params, headers=headers)) as lines:
                     async for line in lines:
                         name, _, value = line.partition(": ")
                         if name:
-                            told[name] = value
-                        elif not line and "data" in told:
-                            seen, event = told["id"], _happened(told["data"])
+                            fields[name] = value
+                        elif not line and "data" in fields:
+                            seen, event = fields["id"], _parse_event(fields["data"])
                             if event is not None:
                                 yield seen, event
                                 if event.type == FINAL_EVENT:
                                     return
-                            told = {}
+                            fields = {}
                         # Also after whoever asked has taken its time over an event.
-                        heard = time.monotonic()
+                        last_answer_s = time.monotonic()
             except (httpx.TransportError, Refused) as error:
-                if not passing(error) or time.monotonic() - heard > patience_s:
+                if not is_passing(error) or time.monotonic() - last_answer_s > patience_s:
                     raise
                 pause_s = pause_s_of(error, AGAIN_S)
             await self._pause(pause_s)
 
     async def report_live(self, venue_id: str, report: LiveReport) -> None:
-        """Report how the live poses of a venue are doing; for the process that sends them."""
+        """Report the state of the live poses of a venue, as the process that sends them."""
         # A service need not know a field that has its default.
         content = report.model_dump(mode="json", exclude_defaults=True)
         await self._ask("PUT", f"/venues/{venue_id}/live", json=content, timeout=REPORT_S)
 
     async def live(self, venue_id: str) -> LiveState:
-        """How the live poses of a venue are doing: the newest report of the process that sends them."""
-        from service.schemas.live import LiveState
-
-        return _read(LiveState, await self._ask("GET", f"/venues/{venue_id}/live"))
+        """Return the newest report of each process that sends live poses of a venue."""
+        return await self._call(LiveState, "GET", f"/venues/{venue_id}/live")
 
     async def live_history(self, venue_id: str, minutes: int = 60) -> LiveHistory:
-        """How they were doing in the last so many minutes, by the minute."""
-        from service.schemas.live import LiveHistory
-
+        """Return the reports of live poses in the last `minutes`, by the minute."""
         params = {"minutes": minutes}
-        return _read(LiveHistory, await self._ask("GET", f"/venues/{venue_id}/live/history", params=params))
+        return await self._call(LiveHistory, "GET", f"/venues/{venue_id}/live/history", params=params)
 
     async def snapshot(self, venue_id: str, camera: str) -> bytes:
-        """What a camera shows now, a JPEG or PNG from its source."""
+        """Return what a camera shows now, a JPEG or PNG from its source."""
         return await self._ask("GET", f"/venues/{venue_id}/cameras/{camera}/snapshot")
 
     # Jobs
@@ -283,7 +269,7 @@ class AsyncClient:
         The job may be an older one if the content is the same.
         """
         sent = _upload(files, options, idempotency_key)
-        return _job(await self._ask("POST", f"/venues/{venue_id}/calibrate", **sent))
+        return await self._call(Job, "POST", f"/venues/{venue_id}/calibrate", **sent)
 
     async def fit_field(
         self,
@@ -294,7 +280,7 @@ class AsyncClient:
     ) -> Job:
         """Submit frames by which to fit the measures of a venue's pitch; the venue stays as it is."""
         sent = _upload(files, options, idempotency_key)
-        return _job(await self._ask("POST", f"/venues/{venue_id}/field/fit", **sent))
+        return await self._call(Job, "POST", f"/venues/{venue_id}/field/fit", **sent)
 
     async def find(
         self,
@@ -312,12 +298,12 @@ class AsyncClient:
         if site is not None:
             document = site.model_dump_json(exclude_defaults=True).encode()
             sent["files"].append((SITE_PART, ("site.json", document, "application/json")))
-        return _job(await self._ask("POST", f"/venues/{venue_id}/find", **sent))
+        return await self._call(Job, "POST", f"/venues/{venue_id}/find", **sent)
 
     async def job(self, job_id: str, wait_s: float = 0) -> Job:
-        """A job, at its end or after `wait_s`."""
+        """Return a job, at its end or after `wait_s`."""
         params = {"wait": wait_s} if wait_s else {}
-        return _job(await self._ask("GET", f"/jobs/{job_id}", params=params))
+        return await self._call(Job, "GET", f"/jobs/{job_id}", params=params)
 
     async def jobs(
         self,
@@ -326,25 +312,23 @@ class AsyncClient:
         kind: JobKind | None = None,
         most: int | None = None,
     ) -> list[Job]:
-        """Jobs, newest first: of one venue, in one state, of one kind; `most`: so many of them."""
-        from service.schemas.job import Jobs
-
-        chosen = {name: value for name, value in (("venue", venue), ("status", status), ("kind", kind)) if value}
-        page = _read(Jobs, await self._ask("GET", "/jobs", params=chosen))
+        """Return jobs, newest first: of one venue, in one state, of one kind; `most`: so many of them."""
+        filters = {name: value for name, value in (("venue", venue), ("status", status), ("kind", kind)) if value}
+        page = await self._call(Jobs, "GET", "/jobs", params=filters)
         found = page.jobs
         while page.next_cursor is not None and (most is None or len(found) < most):
-            more = chosen | {"cursor": page.next_cursor}
-            page = _read(Jobs, await self._ask("GET", "/jobs", params=more))
+            more = filters | {"cursor": page.next_cursor}
+            page = await self._call(Jobs, "GET", "/jobs", params=more)
             found += page.jobs
         return found[:most]
 
     async def again(self, job_id: str) -> Job:
         """Submit the frames of a job once more, from the poses in use: another job."""
-        return _job(await self._ask("POST", f"/jobs/{job_id}/again"))
+        return await self._call(Job, "POST", f"/jobs/{job_id}/again")
 
     async def calibrate_found(self, job_id: str) -> Job:
         """Calibrate a venue with the frames of the search whose cameras `adopt_found` has stored."""
-        return _job(await self._ask("POST", f"/jobs/{job_id}/calibrate"))
+        return await self._call(Job, "POST", f"/jobs/{job_id}/calibrate")
 
     async def delete_job(self, job_id: str) -> None:
         """Forget a job that has ended, with its frames and pictures."""
@@ -352,46 +336,50 @@ class AsyncClient:
 
     async def cancel(self, job_id: str) -> Job:
         """End a job."""
-        return _job(await self._ask("POST", f"/jobs/{job_id}/cancel"))
+        return await self._call(Job, "POST", f"/jobs/{job_id}/cancel")
 
     async def accept(self, job_id: str, camera: str | None = None) -> Job:
         """Put the poses that a calibration found to use, of one camera or all, whatever the gate said."""
         params = {"camera": camera} if camera else {}
-        return _job(await self._ask("POST", f"/jobs/{job_id}/accept", params=params))
+        return await self._call(Job, "POST", f"/jobs/{job_id}/accept", params=params)
 
     async def reject(self, job_id: str) -> Job:
         """Put back what was before the poses of a calibration."""
-        return _job(await self._ask("POST", f"/jobs/{job_id}/reject"))
+        return await self._call(Job, "POST", f"/jobs/{job_id}/reject")
 
     async def job_poses(
         self, job_id: str, form: FormatName, camera: str | None = None, lens: LensChoice = "stored"
     ) -> bytes:
-        """The poses that a job found, of one camera or all, as a file of another tool's format."""
-        return await self._ask("GET", f"/jobs/{job_id}/poses", params=_wanted(form, camera, lens))
+        """Return the poses that a job found, of one camera or all, as a file of another tool's format."""
+        return await self._ask("GET", f"/jobs/{job_id}/poses", params=_export_params(form, camera, lens))
 
     async def picture(self, of: Job, name: str) -> bytes | None:
-        """A picture by the name of its link; None where the job made no such one."""
+        """Return a picture by the name of its link; None: the job made no such picture."""
         return await self._ask("GET", of.links[name]) if name in of.links else None
 
     async def follow(self, followed: Job, show: Callable[[Job], None] | None = None, every_s: float = 0.5) -> Job:
         """Wait for the end of a job; `show` is called as it goes on. The service may be away for a minute."""
-        heard = time.monotonic()
+        last_answer_s = time.monotonic()
         while followed.open:
             if show is not None:
                 show(followed)
             try:
                 followed = await self.job(followed.id, wait_s=every_s)
-                heard = time.monotonic()
+                last_answer_s = time.monotonic()
             except (httpx.TransportError, Refused) as error:
-                if not passing(error) or time.monotonic() - heard > PATIENCE_S:
+                if not is_passing(error) or time.monotonic() - last_answer_s > PATIENCE_S:
                     raise
                 await self._pause(pause_s_of(error, every_s))
         return followed
 
-    # How it travels
+    # Requests
+
+    async def _call(self, model: type[Answer], method: str, path: str, **more: Any) -> Answer:
+        """Return a successful answer as a model; raises `Refused` for others."""
+        return _read(model, await self._ask(method, path, **more))
 
     async def _ask(self, method: str, path: str, **more: Any) -> bytes:
-        """The body of an answer, if it is what was asked for; raises `Refused`."""
+        """Return the body of a successful answer; raises `Refused` for others."""
         return (await self._answer(method, path, **more)).content
 
     async def _answer(self, method: str, path: str, **more: Any) -> httpx.Response:
@@ -404,7 +392,7 @@ class AsyncClient:
         return await self._http.request(method, path, **more)
 
     async def _lines(self, path: str, **more: Any) -> AsyncGenerator[str]:
-        """The lines of a stream, each as soon as it is there; raises `Refused`."""
+        """Yield the lines of a stream as they come; raises `Refused`."""
         rest = b""
         async with self._http.stream("GET", path, timeout=SILENCE_S, **more) as response:
             if not response.is_success:
@@ -416,13 +404,11 @@ class AsyncClient:
                     yield line.decode()
 
     async def _pause(self, seconds: float) -> None:
-        import asyncio
-
         await asyncio.sleep(seconds)
 
 
 class _Blocking(AsyncClient):
-    """The same over a connection that blocks: its coroutines never wait, and so end at their first step."""
+    """An `AsyncClient` over a connection that blocks: its coroutines never wait, and so end at their first step."""
 
     def __init__(self, url: str, api_key: str | None) -> None:
         self.http = httpx.Client(**_connection(url, api_key))
@@ -446,7 +432,7 @@ class _Blocking(AsyncClient):
 
 
 class Client:
-    """One service, by its URL; each call waits for its answer."""
+    """Client of the service at a URL, whose calls block."""
 
     def __init__(self, url: str, api_key: str | None = None) -> None:
         self.calls = _Blocking(url, api_key)
@@ -458,63 +444,54 @@ class Client:
         self.calls.http.close()
 
     def url_of(self, path: str) -> str:
-        """The address of something the service linked to."""
+        """Return the address of a path that the service linked to."""
         return str(self.calls.http.build_request("GET", path).url)
 
-    put_venue = Call(AsyncClient.put_venue)
-    patch_venue = Call(AsyncClient.patch_venue)
-    tagged_venue = Call(AsyncClient.tagged_venue)
-    venue = Call(AsyncClient.venue)
-    venues = Call(AsyncClient.venues)
-    venue_list = Call(AsyncClient.venue_list)
-    delete_venue = Call(AsyncClient.delete_venue)
-    venue_health = Call(AsyncClient.venue_health)
-    history = Call(AsyncClient.history)
-    trend = Call(AsyncClient.trend)
-    restore = Call(AsyncClient.restore)
-    adopt_refined = Call(AsyncClient.adopt_refined)
-    adopt_field = Call(AsyncClient.adopt_field)
-    adopt_found = Call(AsyncClient.adopt_found)
-    venue_poses = Call(AsyncClient.venue_poses)
-    venue_stitch = Call(AsyncClient.venue_stitch)
-    venue_events = Stream(AsyncClient.venue_events)
-    report_live = Call(AsyncClient.report_live)
-    live = Call(AsyncClient.live)
-    live_history = Call(AsyncClient.live_history)
-    snapshot = Call(AsyncClient.snapshot)
-    calibrate = Call(AsyncClient.calibrate)
-    fit_field = Call(AsyncClient.fit_field)
-    find = Call(AsyncClient.find)
-    job = Call(AsyncClient.job)
-    jobs = Call(AsyncClient.jobs)
-    again = Call(AsyncClient.again)
-    calibrate_found = Call(AsyncClient.calibrate_found)
-    delete_job = Call(AsyncClient.delete_job)
-    cancel = Call(AsyncClient.cancel)
-    accept = Call(AsyncClient.accept)
-    reject = Call(AsyncClient.reject)
-    job_poses = Call(AsyncClient.job_poses)
-    picture = Call(AsyncClient.picture)
-    follow = Call(AsyncClient.follow)
+    put_venue = blocking(AsyncClient.put_venue)
+    patch_venue = blocking(AsyncClient.patch_venue)
+    tagged_venue = blocking(AsyncClient.tagged_venue)
+    venue = blocking(AsyncClient.venue)
+    venues = blocking(AsyncClient.venues)
+    venue_list = blocking(AsyncClient.venue_list)
+    delete_venue = blocking(AsyncClient.delete_venue)
+    venue_health = blocking(AsyncClient.venue_health)
+    history = blocking(AsyncClient.history)
+    trend = blocking(AsyncClient.trend)
+    restore = blocking(AsyncClient.restore)
+    adopt_refined = blocking(AsyncClient.adopt_refined)
+    adopt_field = blocking(AsyncClient.adopt_field)
+    adopt_found = blocking(AsyncClient.adopt_found)
+    venue_poses = blocking(AsyncClient.venue_poses)
+    venue_stitch = blocking(AsyncClient.venue_stitch)
+    venue_events = blocking_stream(AsyncClient.venue_events)
+    report_live = blocking(AsyncClient.report_live)
+    live = blocking(AsyncClient.live)
+    live_history = blocking(AsyncClient.live_history)
+    snapshot = blocking(AsyncClient.snapshot)
+    calibrate = blocking(AsyncClient.calibrate)
+    fit_field = blocking(AsyncClient.fit_field)
+    find = blocking(AsyncClient.find)
+    job = blocking(AsyncClient.job)
+    jobs = blocking(AsyncClient.jobs)
+    again = blocking(AsyncClient.again)
+    calibrate_found = blocking(AsyncClient.calibrate_found)
+    delete_job = blocking(AsyncClient.delete_job)
+    cancel = blocking(AsyncClient.cancel)
+    accept = blocking(AsyncClient.accept)
+    reject = blocking(AsyncClient.reject)
+    job_poses = blocking(AsyncClient.job_poses)
+    picture = blocking(AsyncClient.picture)
+    follow = blocking(AsyncClient.follow)
 
 
 def _connection(url: str, api_key: str | None) -> dict[str, Any]:
     headers = {"Authorization": f"Bearer {api_key}"} if api_key else {}
-    # Where there is no TLS, the certificates of all authorities need not be read, which takes as long as a request.
+    # Without TLS: reading the certificates of all authorities would take as long as a request.
     return {"base_url": url, "headers": headers, "timeout": TIMEOUT_S, "verify": not url.startswith("http://")}
 
 
-def _job(answer: bytes) -> Job:
-    from service.schemas.job import Job
-
-    return _read(Job, answer)
-
-
-Answer = TypeVar("Answer", bound=BaseModel)
-
-
 def _read(model: type[Answer], answer: bytes) -> Answer:
-    """What a service of any version says, as far as this client knows it; raises `NotUnderstood`."""
+    """Return an answer of a service of any version, without what this client does not know; raises `NotUnderstood`."""
     try:
         return model.model_validate_json(answer, **TOLERANTLY)
     except ValidationError as error:
@@ -522,10 +499,8 @@ def _read(model: type[Answer], answer: bytes) -> Answer:
         raise NotUnderstood(f"{'.'.join(map(str, first['loc'])) or model.__name__}: {first['msg']}") from error
 
 
-def _happened(data: str) -> Event | None:
-    """An event; None: it is of a type that only a newer service knows."""
-    from service.schemas.events.venue_event import EVENT_TYPES
-
+def _parse_event(data: str) -> Event | None:
+    """Return an event; None: its type is one that only a newer service knows."""
     try:
         event = json.loads(data)
         known = event["type"] in EVENT_TYPES
@@ -536,23 +511,21 @@ def _happened(data: str) -> Event | None:
 
 @cache
 def _event() -> TypeAdapter[Event]:
-    from service.schemas.events.venue_event import Event
-
     return TypeAdapter(Event)
 
 
 def _split(stream: bytes) -> list[bytes]:
-    """The lines of a stream of events, the last of them as far as it has come.
+    """Return the lines of a stream of events, the last of them as far as it has come.
 
-    Not what Python splits by, as httpx does: the names in an event may have separators of Unicode in them.
+    Split by LF alone, unlike `str.splitlines`, which httpx uses: names in events may contain separators of Unicode.
     """
     return stream.split(b"\n")
 
 
-def _wanted(form: FormatName, camera: str | None, lens: LensChoice) -> dict[str, str]:
+def _export_params(form: FormatName, camera: str | None, lens: LensChoice) -> dict[str, str]:
     # An older service knows no choice of lens, and has the stored one.
-    chosen = {"lens": lens} if lens != "stored" else {}
-    return {"format": form} | chosen | ({"camera": camera} if camera else {})
+    lens_choice = {"lens": lens} if lens != "stored" else {}
+    return {"format": form} | lens_choice | ({"camera": camera} if camera else {})
 
 
 def _upload(
@@ -560,8 +533,8 @@ def _upload(
 ) -> dict[str, Any]:
     parts: list[tuple[str, tuple[str, bytes, str]]] = [
         (camera, (path.name, path.read_bytes(), "application/octet-stream"))
-        for camera, several in files.items()
-        for path in ([several] if isinstance(several, Path) else several)
+        for camera, paths in files.items()
+        for path in ([paths] if isinstance(paths, Path) else paths)
     ]
     # Never without a part: a form of none is none.
     if options or not parts:

@@ -1,4 +1,4 @@
-"""What the client makes of an answer that is not the one hoped for: whether to ask again, and when."""
+"""Errors of the client: refusals, answers that cannot be read, and when to ask again."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from typing import Any
 import httpx
 
 NOT_INSTALLED = "/problems/extra-missing"
-# Where a service asks for more time than this (Retry-After), it is asked again all the same.
+# Longest pause before a service is asked again, whatever its Retry-After says.
 LONGEST_PAUSE_S = 60.0
 
 
 class Refused(Exception):  # noqa: N818
-    """The service answered with a problem: `members` are its JSON object.
+    """Raised when the service answers with a problem (RFC 9457), whose JSON object is `members`.
 
-    `busy`: trying the same again later can help. Of conflicts, those that the service gives a time for (Retry-After);
-    and what a proxy says that does not reach the service. `retry_after_s`: when, where the service says it.
+    `busy`: trying the same again later can help, as in a conflict with a Retry-After, or where a proxy does not reach
+    the service. `retry_after_s`: seconds until then, where the service says it.
     """
 
     def __init__(self, status: int, members: Mapping[str, Any], retry_after: str | None = None) -> None:
@@ -33,14 +33,14 @@ class Refused(Exception):  # noqa: N818
 
 
 class NotUnderstood(Exception):  # noqa: N818
-    """The service answered with what this client cannot read, though it allows for newer versions."""
+    """Raised when this client, which allows for newer services, cannot read an answer."""
 
     def __init__(self, what: str) -> None:
         super().__init__(f"The answer of the service is not understood: {what}")
 
 
 def refusal(response: httpx.Response) -> Refused:
-    """Of an answer that was read."""
+    """Return the error for an answer whose body was read."""
     try:
         members = response.json()
     except ValueError:
@@ -49,17 +49,17 @@ def refusal(response: httpx.Response) -> Refused:
     return Refused(response.status_code, members if isinstance(members, dict) else {}, retry_after)
 
 
-def passing(error: httpx.TransportError | Refused) -> bool:
-    """Whether the service may be back in a moment."""
+def is_passing(error: httpx.TransportError | Refused) -> bool:
+    """True if the service may be back in a moment."""
     return isinstance(error, httpx.TransportError) or error.busy
 
 
 def pause_s_of(error: httpx.TransportError | Refused, otherwise_s: float) -> float:
-    """How long to wait before asking again: as long as the service says, within reason."""
+    """Return the seconds to wait before asking again: as many as the service says, up to `LONGEST_PAUSE_S`."""
     asked_s = error.retry_after_s if isinstance(error, Refused) else None
     return otherwise_s if asked_s is None else min(max(asked_s, otherwise_s), LONGEST_PAUSE_S)
 
 
 def _seconds(retry_after: str | None) -> float | None:
-    """What the header says; a proxy may write the time at which, which is passed over."""
+    """Return the seconds of a Retry-After header; None for the date that a proxy may write."""
     return float(retry_after) if retry_after is not None and retry_after.isascii() and retry_after.isdigit() else None

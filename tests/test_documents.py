@@ -6,14 +6,13 @@ from importlib import metadata
 from pathlib import Path
 
 import pytest
-from typer.main import get_command
 
 from service import build
-from service.cli.main import app_of
 from service.settings import setting_names
 from service.variable_names import unread
 from tests import settings_page
 from tests.benchmarks import sizing
+from tests.e2e.commands import all_commands
 
 ROOT = Path(__file__).parents[1]
 OPERATIONS = ROOT / "docker" / "README.md"
@@ -89,15 +88,12 @@ def test_every_target_of_make_that_a_document_names_is_one(document):
     assert set(re.findall(r"^make ([a-z]+(?:-[a-z]+)*)", document.read_text(), re.MULTILINE)) <= targets
 
 
-def commands(command, *path):
-    """The options of every command below one, by the words that call it."""
-    for name, one in getattr(command, "commands", {}).items():
-        yield from commands(one, *path, name)
-    if path and not hasattr(command, "commands"):
-        yield " ".join(path), {option for parameter in command.params for option in parameter.opts} | {"--help"}
-
-
-COMMANDS = dict(commands(get_command(app_of([]))))
+# The options of every command, by the words that call it.
+COMMANDS = {
+    words: {option for parameter in command.params for option in parameter.opts} | {"--help"}
+    for words, command in all_commands()
+    if not hasattr(command, "commands")
+}
 
 
 @pytest.mark.parametrize("document", OF_TODAY, ids=lambda path: str(path.relative_to(ROOT)))

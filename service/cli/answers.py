@@ -1,29 +1,29 @@
-"""What commands answer: JSON for programs, lines for people at a terminal, and in words how a job ended."""
+"""Answers of commands: JSON for programs, lines for people at a terminal, and the outcome of a job in words."""
 
 from __future__ import annotations
 
 import json
 import sys
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from pathlib import Path
+
+from pydantic import BaseModel
 
 from service.cli.printing import ACCEPTED, FAILED, REJECTED, print_note, print_rows
-
-if TYPE_CHECKING:
-    from pydantic import BaseModel
-
-    from service.client import Client
-    from service.schemas.health import VenueHealth
-    from service.schemas.job import Job
-    from service.schemas.results import (
-        CameraResult,
-        FieldResult,
-        FindResult,
-        FoundCameraResult,
-        IntrinsicsResult,
-        LocateResult,
-        Result,
-    )
-    from service.schemas.venue import Venue
+from service.client import Client
+from service.schemas.health import VenueHealth
+from service.schemas.job import Job
+from service.schemas.results import (
+    CameraResult,
+    FieldResult,
+    FindResult,
+    FoundCameraResult,
+    IntrinsicsResult,
+    LocateResult,
+    Result,
+)
+from service.schemas.venue import ChangedVenue, RestoredVenue, Venue
+from service.store.jobs.files import picture_file
 
 
 def print_json(answer: BaseModel) -> None:
@@ -34,14 +34,8 @@ def print_json(answer: BaseModel) -> None:
 def print_answer(answer: BaseModel, *, as_json: bool, with_outcome: bool = True) -> None:
     """Print an answer: as lines at a terminal, as JSON with --json and where standard output is none.
 
-    What is to be known of it goes to standard error in either case: what a venue leaves to be assumed, and
-    `with_outcome` how a job ended.
+    Warnings about a venue, and `with_outcome` the outcome of a job, go to standard error in either case.
     """
-    from service.schemas.health import VenueHealth
-    from service.schemas.job import Job
-    from service.schemas.results import FieldResult, FindResult, Result
-    from service.schemas.venue import ChangedVenue, RestoredVenue, Venue
-
     if as_json or not sys.stdout.isatty():
         has_warnings = isinstance(answer, ChangedVenue | RestoredVenue)
         print(answer.model_dump_json(indent=2, exclude={"warnings"} if has_warnings else None))
@@ -65,8 +59,15 @@ def print_answer(answer: BaseModel, *, as_json: bool, with_outcome: bool = True)
             _print_result(answer)
 
 
+def write_pictures(folder: Path, pictures: Mapping[str, bytes]) -> None:
+    """Write pictures to files that are named as they are, in a folder that is made where it is missing."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, picture in pictures.items():
+        (folder / picture_file(name.replace("/", "_"))).write_bytes(picture)
+
+
 def print_submitted(client: Client, job: Job, *, as_json: bool) -> None:
-    """Print where a job is that was submitted."""
+    """Print the address of a submitted job."""
     url = client.url_of(job.links["self"])
     if as_json or not sys.stdout.isatty():
         print(json.dumps({"job": job.id, "url": url}, indent=2))
@@ -91,8 +92,6 @@ def _print_venue(venue: Venue) -> None:
 
 
 def _print_job(job: Job) -> None:
-    from service.schemas.results import Result
-
     if isinstance(job.result, Result):
         print_calibration(job.result)
     venue = f" of venue {job.venue}" if job.venue else ""
@@ -101,7 +100,7 @@ def _print_job(job: Job) -> None:
 
 
 def print_calibration(result: Result) -> None:
-    """Print where each camera stands, how far it moved and how sure that is, and the stitch error."""
+    """Print pose, movement and uncertainty of each camera, and the stitch error."""
     for camera in result.cameras:
         _print_camera(camera)
     before, after = _pixels(result.stitch_error_before_px), _pixels(result.stitch_error_px)
@@ -138,13 +137,11 @@ def _pixels(pixels: float | None) -> str:
     return "unknown" if pixels is None else f"{pixels:.2f} px"
 
 
-# How a job ended
+# Outcomes of jobs
 
 
 def job_exit_code(job: Job) -> int:
     """Return the exit code for a job that has ended."""
-    from service.schemas.results import IntrinsicsResult
-
     match job.result:
         case None:
             return FAILED
@@ -155,7 +152,7 @@ def job_exit_code(job: Job) -> int:
 
 
 def print_outcome(job: Job) -> None:
-    """Print for whoever looks what came of a job that has ended."""
+    """Print the outcome of a job that has ended to standard error."""
     if job.result is not None:
         _print_result(job.result)
     elif job.error is not None:
@@ -165,9 +162,7 @@ def print_outcome(job: Job) -> None:
 
 
 def _print_result(result: BaseModel) -> None:
-    """Print for whoever looks what a result is, and why it was rejected."""
-    from service.schemas.results import FieldResult, FindResult, IntrinsicsResult, LocateResult, Result
-
+    """Print a summary of a result to standard error, and why it was rejected."""
     if isinstance(result, Result):
         for warning in result.warnings:
             print_note(f"Warning: {warning}")
@@ -191,9 +186,7 @@ def _print_result(result: BaseModel) -> None:
 
 
 def outcome_text(job: Job) -> str:
-    """The verdict, or what went wrong, in a line."""
-    from service.schemas.results import IntrinsicsResult, Result
-
+    """Return the verdict of a job, or its error, in a line."""
     if job.error is not None:
         return f"{job.error.title}: {job.error.detail}"
     if job.result is None or isinstance(job.result, IntrinsicsResult):
@@ -204,7 +197,7 @@ def outcome_text(job: Job) -> str:
 
 
 def print_lens_summary(result: IntrinsicsResult) -> None:
-    """What a person looks at first."""
+    """Print the errors, the focal length and the rejected photos of a lens calibration."""
     used = sum(photo.fate == "used" for photo in result.photos)
     print_note(
         f"{used} of {len(result.photos)} photos, {result.rms_px:.2f} px rms; left out, {result.left_out_px:.2f} px"
@@ -212,13 +205,13 @@ def print_lens_summary(result: IntrinsicsResult) -> None:
     (fx, _, cx), (_, fy, cy), _ = result.intrinsics.matrix
     print_note(f"Focal length {fx:.1f}, {fy:.1f} px; principal point {cx:.1f}, {cy:.1f}; {' '.join(result.terms)}")
     for photo in result.photos:
-        told = {
+        fate = {
             "used": None,
             "no-board": "shows no board",
             "wrong-size": "has another size",
             "hurts": f"hurts: the others foretell it to {photo.left_out_px or 0:.1f} px only; left out",
         }.get(photo.fate, photo.fate)
-        for words in (told, "is blurred" if photo.blurred else None):
+        for words in (fate, "is blurred" if photo.blurred else None):
             if words:
                 print_note(f"  {photo.name} {words}")
     for warning in result.warnings:
@@ -226,7 +219,7 @@ def print_lens_summary(result: IntrinsicsResult) -> None:
 
 
 def print_pose_summary(result: LocateResult) -> None:
-    """Where a camera stands, and which clicks are doubted."""
+    """Print the position of a camera, and the clicked points that do not fit it."""
     x, y, z = result.pose.position
     print_note(f"Camera {result.camera}: ({x:.2f}, {y:.2f}, {z:.2f}) m, points {result.rms_px:.1f} px rms")
     for point in result.points:
@@ -245,7 +238,7 @@ def print_pose_summary(result: LocateResult) -> None:
 
 
 def print_field_summary(result: FieldResult) -> None:
-    """Each measure of a pitch, or why it cannot be told."""
+    """Print each fitted measure of a pitch, or why the frames do not determine it."""
     for measure in result.measures:
         what = measure.name.removesuffix("_m").replace("_", " ")
         if measure.known:
@@ -257,7 +250,7 @@ def print_field_summary(result: FieldResult) -> None:
 
 
 def print_found_summary(result: FindResult) -> None:
-    """A line for each camera: where it stands, or why it was not found."""
+    """Print a line for each camera: its position, or why it was not found."""
     for camera in result.cameras:
         print_note(_found_text(camera))
         for remark in camera.remarks:

@@ -1,7 +1,4 @@
-"""Which service, and the key for it, where a file `.env` says so.
-
-A module of its own: what reads such files takes longer to load than a command of the client to do its work.
-"""
+"""Address and key of the service in a file `.env`."""
 
 from __future__ import annotations
 
@@ -9,7 +6,7 @@ from pydantic_settings import BaseSettings, SettingsConfigDict
 
 
 class EnvFile(BaseSettings):
-    """What `.env` says of the service that commands call."""
+    """Variables of `.env` that commands of the client read."""
 
     model_config = SettingsConfigDict(env_prefix="ESC_", env_file=".env", env_ignore_empty=True, extra="ignore")
 

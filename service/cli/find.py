@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from service.cli.answers import print_answer
-from service.cli.arguments import AnswerAsJson, Frames, parse_document, parse_frame_files, require_folder_of
-from service.cli.printing import REJECTED, USAGE, fail, progress_bar
-
-if TYPE_CHECKING:
-    from service.schemas.find import SoughtSite
-    from service.settings import Settings
+from service.cli.answers import print_answer, write_pictures
+from service.cli.arguments import AnswerAsJson, Frames, VenueOutput, parse_document, parse_frame_files
+from service.cli.local_engine import engine_progress, engine_settings, report_job_failures
+from service.cli.printing import REJECTED, USAGE, fail
+from service.intake import image_checks
+from service.schemas.find import SoughtSite
+from service.settings import Settings
 
 
 def find(
@@ -27,15 +27,7 @@ def find(
         ),
     ],
     frames: Frames,
-    output: Annotated[
-        Path,
-        typer.Option(
-            "-o",
-            "--output",
-            callback=require_folder_of,
-            help="JSON file to write the venue to, for `esc venue put` and `esc run`.",
-        ),
-    ],
+    output: VenueOutput,
     pictures: Annotated[
         Path | None, typer.Option("--pictures", help="Folder for a picture of each candidate of each camera.")
     ] = None,
@@ -47,9 +39,6 @@ def find(
     Without a pose, and without a lens, too: both are found together. What is known helps: `intrinsics`,
     `field_of_view_deg`, a rough `position`, or the `side` of the field that a camera stands on.
     """
-    from service.cli.local_engine import engine_settings, report_job_failures
-    from service.schemas.find import SoughtSite
-
     settings = engine_settings()
     place = parse_document(SoughtSite, site.read_bytes(), str(site))
     files = _checked_files(place, frames, settings)
@@ -57,12 +46,10 @@ def find(
     from worker.jobs import find as finding
 
     resources = ComputeResources.of(settings)
-    with report_job_failures(), progress_bar() as show:
-        solution = finding.solve(place, files, seed, resources, lambda step: show(step["stage"], step["fraction"]))
+    with engine_progress() as show:
+        solution = finding.solve(place, files, seed, resources, show)
     if pictures is not None:
-        pictures.mkdir(parents=True, exist_ok=True)
-        for name, picture in solution.pictures.items():
-            (pictures / f"{name}.jpg").write_bytes(picture)
+        write_pictures(pictures, solution.pictures)
     print_answer(solution.result, as_json=as_json)
     if not solution.result.accepted:
         raise typer.Exit(REJECTED)
@@ -71,10 +58,7 @@ def find(
 
 
 def _checked_files(place: SoughtSite, frames: list[str], settings: Settings) -> dict[str, list[bytes]]:
-    """The frames of each camera, as far as their structure is checked before they are decoded."""
-    from service.cli.local_engine import report_job_failures
-    from service.intake import image_checks
-
+    """Return the frames of each camera, their structure checked before they are decoded."""
     files = {camera: [path.read_bytes() for path in paths] for camera, paths in parse_frame_files(frames).items()}
     ids = [camera.id for camera in place.cameras]
     for camera in files:

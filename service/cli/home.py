@@ -1,4 +1,4 @@
-"""`esc home`: what a service keeps, moved to another place."""
+"""`esc home`: copies of the database and the files of a service."""
 
 from __future__ import annotations
 
@@ -8,18 +8,19 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
+import sqlalchemy as sa
 import typer
 
-from service.cli.arguments import load_settings
+from service import queue
+from service.cli.local_database import report_database_errors
 from service.cli.printing import FAILED, USAGE, fail, print_note, print_rows
-from service.cli.serve import report_database_errors
-
-if TYPE_CHECKING:
-    import sqlalchemy as sa
-
-    from service.store.blobs import Blobs
+from service.cli.service_settings import load_settings
+from service.settings import BLOB_URL, DATABASE_URL, Settings
+from service.store.blobs import BLOB_OUTAGES, Blobs
+from service.store.copying import CannotCopy, copy_rows, exclusive_snapshot, require_empty
+from service.store.database import connect, reading, sqlite_file
 
 # A bucket that does not answer is asked again for so long.
 BLOB_PATIENCE_S = 120.0
@@ -37,7 +38,7 @@ def home() -> None:
 
 @dataclass(frozen=True)
 class ServiceLocation:
-    """Where a service keeps what it keeps; `blobs` None: it was not said."""
+    """Database and blob store of a service, as URLs; `blobs` None: not given."""
 
     database: str
     blobs: str | None
@@ -65,9 +66,6 @@ def copy_home(
     Venues, history, memories, trends, charts, schedules, jobs and keys. Open jobs wait in the queue of the copy. FROM
     stays as it is.
     """
-    from service.store.blobs import BLOB_OUTAGES
-    from service.store.copying import CannotCopy
-
     here, there = _parse_location(source, blobs_from), _parse_location(target, blobs_to)
     if here.database == there.database:
         fail("FROM and TO are one database.", USAGE)
@@ -122,12 +120,8 @@ def _copy(
 
     `committing` is called when from now on nothing may be taken back.
     """
-    from service import queue
-    from service.store.blobs import Blobs
-    from service.store.copying import copy_rows, exclusive_snapshot
-
     with ExitStack() as stack:
-        reading = stack.enter_context(exclusive_snapshot(source))
+        snapshot = stack.enter_context(exclusive_snapshot(source))
         engine = stack.enter_context(_new_database(target))
         files = None
         if blobs_from != blobs_to:
@@ -136,18 +130,12 @@ def _copy(
         queue.migrate(target)
         waiting = queue.Queue(target)
         stack.callback(waiting.close)
-        return files, copy_rows(reading, engine, waiting.enqueue, committing)
+        return files, copy_rows(snapshot, engine, waiting.enqueue, committing)
 
 
 @contextmanager
 def _new_database(url: str) -> Iterator[sa.Engine]:
-    """An engine on an empty database; if what is done with it fails, what was made there is taken away again."""
-    import sqlalchemy as sa
-
-    from service import queue
-    from service.store.copying import require_empty
-    from service.store.database import connect, reading, sqlite_file
-
+    """Yield an engine on an empty database; if the block fails, what was made there is removed again."""
     file = sqlite_file(url)
     was_there = file is not None and file.exists()
     engine = connect(url)
@@ -173,9 +161,7 @@ def _new_database(url: str) -> Iterator[sa.Engine]:
 
 @contextmanager
 def _copy_files(here: Blobs, there: Blobs, url: str) -> Iterator[int]:
-    """Copy every file, and give how many; if what comes after fails, the copies are deleted again."""
-    from service.store.copying import CannotCopy
-
+    """Copy every file and yield their count; if the block fails, the copies are deleted again."""
     paths, before = [*here.paths()], {*there.paths()}
     # A copy that was killed left some of them, which are copied again.
     if foreign := sorted(before.difference(paths)):
@@ -198,8 +184,6 @@ def _copy_files(here: Blobs, there: Blobs, url: str) -> Iterator[int]:
 
 
 def _parse_location(text: str, blobs: str | None) -> ServiceLocation:
-    from service.settings import BLOB_URL, DATABASE_URL, Settings
-
     if blobs is not None and not BLOB_URL.fullmatch(blobs):
         fail("Expected is s3://bucket, s3://bucket/folder or file:///folder for files.", USAGE)
     if DATABASE_URL.fullmatch(text):
@@ -211,7 +195,5 @@ def _parse_location(text: str, blobs: str | None) -> ServiceLocation:
 
 
 def _without_password(url: str) -> str:
-    """A database's URL without its password."""
-    import sqlalchemy as sa
-
+    """Return the URL of a database without its password."""
     return sa.make_url(url).render_as_string(hide_password=True)

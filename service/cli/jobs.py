@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -22,14 +22,13 @@ from service.cli.arguments import (
     Yes,
     require_yes,
 )
-from service.cli.printing import FAILED, fail, follow_to_end, print_rows, write_document
+from service.cli.printing import FAILED, fail, print_rows, write_document
+from service.cli.progress import follow_to_end
 from service.cli.service_client import open_client
+from service.client import Client
+from service.schemas.job import Job, Jobs
 from service.schemas.names import JobKind, JobStatus
 from service.store.jobs.files import picture_file
-
-if TYPE_CHECKING:
-    from service.client import Client
-    from service.schemas.job import Job
 
 app = typer.Typer(
     no_args_is_help=True, help="Jobs of a running service: calibrations, and what comes before the first."
@@ -51,8 +50,6 @@ def list_jobs(
     with open_client(url, api_key) as client:
         jobs = client.jobs(venue, status, kind, limit)
     if as_json:
-        from service.schemas.job import Jobs
-
         print_json(Jobs(jobs=jobs))
         return
     rows = [

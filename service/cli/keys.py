@@ -1,4 +1,4 @@
-"""`esc key`: who may call a service of this machine."""
+"""`esc key`: API keys of a service on this machine."""
 
 from __future__ import annotations
 
@@ -8,17 +8,18 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from service.cli.arguments import Data, Yes, load_settings, require_yes
+from service.api.auth import KEY_CACHED_FOR_S
+from service.cli.arguments import Data, Yes, require_yes
+from service.cli.local_database import report_database_errors, require_folders
 from service.cli.printing import FAILED, USAGE, fail, print_note, print_rows
-from service.cli.serve import report_database_errors, require_folders
+from service.cli.service_settings import load_settings
 from service.schemas.names import ID_IN_WORDS, ID_PATTERN, Scope
-
-if TYPE_CHECKING:
-    from service.store.keys import KeyRepository
+from service.store.database import connect, migrate, sqlite_file
+from service.store.keys import KeyExists, KeyRepository, old_name
 
 OTHER_FOLDER_HINT = "Of a service that has its folder elsewhere, name it: --data, or ESC_DATA."
 UNITS = {"m": timedelta(minutes=1), "h": timedelta(hours=1), "d": timedelta(days=1)}
@@ -44,8 +45,6 @@ def add_key(
     data: Data = None,
 ) -> None:
     """Make a key and print it, this once: what is stored is its hash."""
-    from service.store.keys import KeyExists
-
     if not re.fullmatch(ID_PATTERN, name):
         fail(f"{name!r} is no name of a key: {ID_IN_WORDS}.", USAGE)
     for venue in venues or ():
@@ -81,19 +80,17 @@ def rotate_key(
     data: Data = None,
 ) -> None:
     """Make a new key in place of another and print it, this once; the old one stays good for a while, as NAME-old."""
-    from service.store.keys import old_name
-
     length = re.fullmatch(r"(\d{1,5})([mhd])", grace, re.ASCII)
     if length is None:
         fail(f"{grace!r} is no time: a number and m, h or d, such as 30m, 24h or 7d.", USAGE)
-    lasts = int(length[1]) * UNITS[length[2]]
+    grace_time = int(length[1]) * UNITS[length[2]]
     with _known_keys(data) as keys:
-        key = keys.rotate(name, lasts)
+        key = keys.rotate(name, grace_time)
     if key is None:
         fail(f"There is no key {name}; esc key list names those there are.", FAILED)
     _print_key(key)
     print_note(
-        f"The old key is {old_name(name)} now and good until {datetime.now(UTC) + lasts:%Y-%m-%dT%H:%MZ} at most."
+        f"The old key is {old_name(name)} now and good until {datetime.now(UTC) + grace_time:%Y-%m-%dT%H:%MZ} at most."
     )
 
 
@@ -104,8 +101,6 @@ def remove_key(
     data: Data = None,
 ) -> None:
     """Forget a key."""
-    from service.api.auth import KEY_CACHED_FOR_S
-
     require_yes(yes, f"Forget key {name}, which its user then calls with in vain")
     with _known_keys(data) as keys:
         if not keys.remove(name):
@@ -123,9 +118,7 @@ def _print_key(key: str) -> None:
 
 @contextmanager
 def _known_keys(data: Path | None) -> Iterator[KeyRepository]:
-    """The keys of a service that has been there: to ask for them makes none."""
-    from service.store.database import sqlite_file
-
+    """Yield the keys of a service that has run before; exit where it has no database yet."""
     url = load_settings(data=data).home_database_url
     file = sqlite_file(url)
     if file is not None and not file.exists():
@@ -136,10 +129,7 @@ def _known_keys(data: Path | None) -> Iterator[KeyRepository]:
 
 @contextmanager
 def _keys(data: Path | None) -> Iterator[KeyRepository]:
-    """The keys of the service whose folder or database the settings name."""
-    from service.store.database import connect, migrate
-    from service.store.keys import KeyRepository
-
+    """Yield the keys of the service whose folder or database the settings name."""
     settings = load_settings(data=data)
     require_folders(settings)
     with report_database_errors(settings):

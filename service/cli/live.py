@@ -7,32 +7,51 @@ import re
 import signal
 import sys
 import threading
+import time
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
+import httpx
 import typer
 
 from service.cli.answers import outcome_text
-from service.cli.arguments import DEFAULT_URL, ApiKey, Url, load_settings, parse_by_camera, require_cameras
+from service.cli.arguments import (
+    DEFAULT_URL,
+    ApiKey,
+    Url,
+    VenueOrFile,
+    parse_by_camera,
+    parse_frame_rate,
+    require_cameras,
+)
 from service.cli.printing import USAGE, OngoingTrouble, fail, print_note
 from service.cli.service_client import load_venue
-
-if TYPE_CHECKING:
-    from service.cli.tracked_streams import TrackedStreams
-    from service.live.destinations import Destination, UdpSocket
-    from service.live.reports import LiveReporter
-    from service.live.stored_poses import StoredPoses
-    from service.schemas.job import Job
-    from service.schemas.venue import Venue
+from service.cli.service_settings import load_settings
+from service.cli.tracked_streams import TrackedStreams
+from service.client import Client, NotUnderstood, Refused
+from service.formats.freed import LARGEST_COUNT, EncoderCounts
+from service.live.destinations import (
+    OPENTRACKIO_PORT,
+    Destination,
+    FreeD,
+    JsonLines,
+    OpenTrackIO,
+    PoseSender,
+    UdpSocket,
+)
+from service.live.recovery import Recovery
+from service.live.reports import LiveReporter
+from service.live.stored_poses import StoredPoses, send_stored_poses
+from service.schemas.job import Job
+from service.schemas.venue import Venue
 
 # Accepted jobs come every few minutes; a renderer may see the new pose so much later.
 LOOK_AGAIN_S = 2.0
 # For the last report when it is stopped; a service that hangs is not waited for.
 LAST_REPORT_S = 2.0
-HIGHEST_RATE = 1000
-# What ran before a restart counts as running for five seconds after its last report.
+# A process counts as running for five seconds after its last report, also one from before a restart.
 OTHERS_AFTER_S, OTHERS_AGAIN_S = 6.0, 30.0
 MULTICAST = "multicast"
 
@@ -45,9 +64,7 @@ def _check_interface(address: str | None) -> str | None:
 
 
 def live(
-    venue: Annotated[
-        str, typer.Argument(metavar="VENUE", help="Id of a venue of the service, or the JSON file of one.")
-    ],
+    venue: VenueOrFile,
     streams: Annotated[
         list[str] | None,
         typer.Argument(
@@ -131,12 +148,10 @@ def live(
         fail("--hold sends stored poses alone: leave it out, or the streams", USAGE)
     if recover and (Path(venue).is_file() or not addresses):
         fail("--recover has the service calibrate a venue of its own whose cameras are tracked in streams", USAGE)
-    beat = _parse_rate(rate)
+    sample_rate = parse_frame_rate(rate, "samples")
     zooms, focuses = _parse_counts(zoom or [], "--zoom"), _parse_counts(focus or [], "--focus")
     if (zooms or focuses) and not freed:
         fail("--zoom and --focus are sent by FreeD alone: add --freed HOST:PORT", USAGE)
-    from service.live.destinations import UdpSocket
-
     if not (opentrackio or freed or as_json):
         opentrackio = [MULTICAST]
     with UdpSocket(interface) as socket:
@@ -144,13 +159,13 @@ def live(
         stored = load_venue(venue, url, api_key)
         require_cameras(stored, [*zooms, *focuses])
         service = None if Path(venue).is_file() else (url, api_key)
-        _send(stored, destinations, beat, addresses, follow_every, predict / 1000, service, recover=recover)
+        _send(stored, destinations, sample_rate, addresses, follow_every, predict / 1000, service, recover=recover)
 
 
 def _send(
     stored: Venue,
     destinations: Mapping[str, Destination],
-    beat: Fraction,
+    sample_rate: Fraction,
     addresses: Mapping[str, str],
     every: int,
     ahead_s: float,
@@ -162,15 +177,10 @@ def _send(
 
     It is asked for new poses, told how those that are sent are doing, and with `recover` asked for calibrations.
     """
-    from service.cli.tracked_streams import TrackedStreams
-    from service.live.destinations import PoseSender
-    from service.live.reports import LiveReporter
-    from service.live.stored_poses import StoredPoses, send_stored_poses
-
     poses, stop, unread = StoredPoses(stored), threading.Event(), threading.Event()
     troubles = {name: OngoingTrouble() for name in destinations}
 
-    def tell(name: str, error: OSError | None) -> None:
+    def note_delivery(name: str, error: OSError | None) -> None:
         if error is None:
             troubles[name].over(f"Sent to {name} again")
         else:
@@ -180,25 +190,25 @@ def _send(
         unread.set()
         stop.set()
 
-    sender = PoseSender(destinations, tell, end_unread)
+    sender = PoseSender(destinations, note_delivery, end_unread)
     reporter = LiveReporter(poses, addresses, [*destinations])
     streams = TrackedStreams.of(stored, addresses, every, ahead_s, sender, reporter.sent)
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: stop.set())
-    beside = []
+    reports = []
     if service is not None:
         threading.Thread(target=_ask_for_poses, args=(poses, streams, reporter, *service, stop), daemon=True).start()
-        beside = [threading.Thread(target=_report, args=(reporter, *service, stop), daemon=True)]
+        reports = [threading.Thread(target=_report, args=(reporter, *service, stop), daemon=True)]
         if recover:
             threading.Thread(target=_recover, args=(stored.id, streams, *service, stop), daemon=True).start()
     cameras = ", ".join(f"{camera.id} (source {n})" for n, camera in enumerate(stored.cameras, 1))
-    print_note(f"Sending the poses of venue {stored.id}, stored ones {float(beat):g} times a second: {cameras}")
+    print_note(f"Sending the poses of venue {stored.id}, stored ones {float(sample_rate):g} times a second: {cameras}")
     streams.start()
-    for thread in beside:
+    for thread in reports:
         thread.start()
-    send_stored_poses(poses, sender, beat, stop, streams.is_tracked)
+    send_stored_poses(poses, sender, sample_rate, stop, streams.is_tracked)
     streams.stop()
-    for thread in beside:
+    for thread in reports:
         thread.join(LAST_REPORT_S)
     # A filter whose reader has gone says nothing.
     if not unread.is_set():
@@ -206,9 +216,7 @@ def _send(
 
 
 def _report(reporter: LiveReporter, url: str, api_key: str | None, stop: threading.Event) -> None:
-    """Tell the service how the poses that are sent are doing, until stopped."""
-    from service.client import Client
-
+    """Report the state of the live poses to the service, until stopped."""
     trouble = OngoingTrouble()
     with Client(url, api_key) as client:
         reporter.run(
@@ -227,16 +235,7 @@ def _ask_for_poses(
     api_key: str | None,
     stop: threading.Event,
 ) -> None:
-    """Ask for the venue's poses again and again; where the service does not answer, the last ones stay in use.
-
-    Now and then it asks as well who else sends poses of the venue.
-    """
-    import time
-
-    import httpx
-
-    from service.client import Client, NotUnderstood, Refused
-
+    """Poll the service for new poses, which replace those in use, and for other senders of the venue, until stopped."""
     trouble, company, venue = OngoingTrouble(), OngoingTrouble(), poses.venue.id
     look_for_others_s = time.monotonic() + OTHERS_AFTER_S
     with Client(url, api_key) as client:
@@ -267,15 +266,12 @@ def _print_company(company: OngoingTrouble, others: Sequence[str]) -> None:
 
 def _recover(venue: str, streams: TrackedStreams, url: str, api_key: str | None, stop: threading.Event) -> None:
     """Have the service calibrate the venue where cameras are lost, until stopped."""
-    from service.client import Client
-    from service.live.recovery import Recovery
-
     with Client(url, api_key) as client:
         Recovery(venue, streams, _RecoveryNotes()).run(client, stop)
 
 
 class _RecoveryNotes:
-    """Prints how calibrations of lost cameras go; why they change nothing, once for each reason."""
+    """Print the calibrations of lost cameras; of those that change nothing, each reason once in a row."""
 
     def __init__(self) -> None:
         self._trouble = OngoingTrouble()
@@ -285,7 +281,7 @@ class _RecoveryNotes:
         print_note(f"Lost: camera {', '.join(lost)}. Job {job.id} calibrates the venue by the newest pictures")
 
     def ended(self, lost: Sequence[str], job: Job) -> None:
-        """Print what became of it."""
+        """Print the outcome of the calibration."""
         if job.venue_revision is None:
             self._trouble.say(f"The stored pose of {', '.join(lost)} stays, {outcome_text(job)}")
         else:
@@ -307,9 +303,6 @@ def _destinations(
     as_json: bool,
 ) -> dict[str, Destination]:
     """Return the destinations by their names, which reports and notes have."""
-    from service.formats.freed import EncoderCounts
-    from service.live.destinations import OPENTRACKIO_PORT, FreeD, JsonLines, OpenTrackIO
-
     found: dict[str, Destination] = {
         f"opentrackio {address}": OpenTrackIO(socket)
         if address == MULTICAST
@@ -326,7 +319,7 @@ def _destinations(
 
 
 def _parse_address(text: str, option: str, usual_port: int | None) -> tuple[str, int]:
-    """Of HOST:PORT, [IPV6]:PORT, or HOST alone where there is a usual port."""
+    """Return host and port of HOST:PORT or [IPV6]:PORT, or of HOST alone if there is a usual port."""
     match = re.fullmatch(r"(?:\[(?P<six>[^\]]+)\]|(?P<host>[^:\s]+))(?::(?P<port>\d{1,5}))?", text)
     port = None if match is None else match["port"] or usual_port
     if match is None or port is None or not 0 < int(port) < 65536:
@@ -335,20 +328,8 @@ def _parse_address(text: str, option: str, usual_port: int | None) -> tuple[str,
 
 
 def _parse_counts(arguments: Sequence[str], option: str) -> dict[str, int]:
-    from service.formats.freed import LARGEST_COUNT
-
     counts = parse_by_camera(arguments, f"CAMERA=COUNT of {option}, for instance left=32768")
     for camera, count in counts.items():
         if not (count.isascii() and count.isdecimal() and int(count[:9]) <= LARGEST_COUNT and len(count) < 9):
             fail(f"{option} {camera}={count}: expected a count from 0 to {LARGEST_COUNT}", USAGE)
     return {camera: int(count) for camera, count in counts.items()}
-
-
-def _parse_rate(text: str) -> Fraction:
-    try:
-        rate = Fraction(text)
-    except (ValueError, ZeroDivisionError):
-        rate = Fraction(0)
-    if not 0 < rate <= HIGHEST_RATE:
-        fail(f"--rate {text}: samples a second, such as 25, 29.97 or 30000/1001", USAGE)
-    return rate

@@ -11,14 +11,14 @@ import sys
 from http import HTTPStatus
 from http.client import HTTPConnection, HTTPException
 
-from service.cli.arguments import load_settings
 from service.cli.printing import FAILED, fail
+from service.cli.service_settings import load_settings
 
 ANSWER_S = 4.0
 
 
 def main() -> None:
-    """End with 0 if it answers."""
+    """Exit with 0 if the API answers."""
     settings = load_settings()
     # Without the proxies of the environment, which urllib would ask.
     connection = HTTPConnection(_host_to_ask(settings.host), settings.port, timeout=ANSWER_S)

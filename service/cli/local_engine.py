@@ -1,34 +1,37 @@
-"""What commands share that compute on this machine, without a service."""
+"""Settings, frames and failures of the commands that compute on this machine, without a service.
+
+NumPy and OpenCV read the environment when they are loaded: such a command imports the engine after `engine_settings()`.
+"""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import Any
 
-from service.cli.arguments import load_settings, parse_frame_files
+from service.cli.arguments import parse_frame_files
 from service.cli.printing import FAILED, fail, problem_text
+from service.cli.progress import progress_bar
+from service.cli.service_settings import load_settings
 from service.intake import image_checks
 from service.schemas.problems import Problem
 from service.schemas.venue import Venue
-
-if TYPE_CHECKING:
-    from service.settings import Settings
+from service.settings import Settings
 
 
 def engine_settings() -> Settings:
-    """The settings, also in the environment: native libraries read theirs when they are loaded, so call it before."""
+    """Return the settings, and set what native libraries read of them in the environment."""
     settings = load_settings()
     os.environ |= settings.native_environment
     return settings
 
 
 def checked_files(stored: Venue, frames: Sequence[str], settings: Settings) -> dict[str, list[bytes]]:
-    """Frames by camera, as the service would let them in."""
+    """Return the frames of each camera, checked as the service checks an upload."""
     files = {camera: [path.read_bytes() for path in paths] for camera, paths in parse_frame_files(frames).items()}
     with report_job_failures():
-        image_checks.check_cameras(stored, {camera: len(several) for camera, several in files.items()}, settings)
+        image_checks.check_cameras(stored, {camera: len(images) for camera, images in files.items()}, settings)
         budget = image_checks.PixelBudget(settings)
         for camera in stored.cameras:
             for data in files[camera.id]:
@@ -38,7 +41,7 @@ def checked_files(stored: Venue, frames: Sequence[str], settings: Settings) -> d
 
 @contextmanager
 def report_job_failures() -> Iterator[None]:
-    """What is refused, and what a job without a server fails of, is a line."""
+    """Exit with a line where frames are refused or the job fails."""
     from worker.jobs.from_schemas import JobFailedError
 
     try:
@@ -47,3 +50,10 @@ def report_job_failures() -> Iterator[None]:
         fail(problem_text(problem.detail, problem.parts), FAILED)
     except JobFailedError as failure:
         fail(str(failure), FAILED)
+
+
+@contextmanager
+def engine_progress() -> Iterator[Callable[[Mapping[str, Any]], None]]:
+    """Show a progress bar of the steps that the yielded function takes; exit with a line where the job fails."""
+    with report_job_failures(), progress_bar() as show:
+        yield lambda step: show(step["stage"], step["fraction"])

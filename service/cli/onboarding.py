@@ -1,41 +1,47 @@
-"""`esc intrinsics`, `pose` and `field fit`: what comes before the first calibration."""
+"""`esc intrinsics`, `pose` and `field fit`: lenses, first poses and the field before the first calibration."""
 
 from __future__ import annotations
 
 import json
 import re
+import secrets
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
-from service.cli.answers import job_exit_code, print_answer, print_lens_summary, print_outcome, print_pose_summary
+from fields.sports import template_name
+from fields.template import NAMES, load
+from service.cli.answers import (
+    job_exit_code,
+    print_answer,
+    print_lens_summary,
+    print_outcome,
+    print_pose_summary,
+    write_pictures,
+)
 from service.cli.arguments import (
     DEFAULT_URL,
     AnswerAsJson,
     ApiKey,
     Frames,
     Url,
+    VenueOutput,
     parse_document,
     parse_frame_files,
     require_folder_of,
 )
-from service.cli.printing import (
-    FAILED,
-    REJECTED,
-    USAGE,
-    fail,
-    follow_to_end,
-    progress_bar,
-)
+from service.cli.local_engine import checked_files, engine_progress, engine_settings
+from service.cli.printing import FAILED, REJECTED, USAGE, fail
+from service.cli.progress import follow_to_end
 from service.cli.service_client import open_client
+from service.intake import image_checks
+from service.schemas.geometry import LensFile, Pose, PoseIn
 from service.schemas.names import ID_PATTERN, LensModel
-
-if TYPE_CHECKING:
-    from service.schemas.options import FieldOptions, IntrinsicsOptions
-    from service.schemas.results import FieldResult
-    from service.schemas.venue import Venue
+from service.schemas.options import ClickedPoints, FieldOptions, IntrinsicsOptions
+from service.schemas.results import FieldResult
+from service.schemas.venue import CameraIn, Site, Venue, VenueIn
 
 LENS_EXAMPLE = (
     '{"image_size": [3840, 2160], "intrinsics": {"matrix": [[fx, 0, cx], [0, fy, cy], [0, 0, 1]], '
@@ -47,12 +53,9 @@ field_app = typer.Typer(no_args_is_help=True, help="The pitch of a venue: fit it
 
 
 def _print_points(sport: str | None) -> None:
-    """Print every name that a point of a sport's field has, and end."""
+    """Print every name that a point of a sport's field has, and exit."""
     if sport is None:
         return
-    from fields.sports import template_name
-    from fields.template import NAMES, load
-
     name = template_name(sport)
     if name is None:
         fail(f"There is no field of {sport!r}; there are {', '.join(NAMES)}", USAGE)
@@ -100,18 +103,15 @@ def intrinsics(
     ] = None,
 ) -> None:
     """Find the lens of a camera from photos of a chessboard. Exit: 0 found (read the warnings), 1 not, 2 usage."""
-    from service.cli.local_engine import engine_settings, report_job_failures
-    from service.intake import image_checks
-
     settings = engine_settings()
     options = _parse_lens_options(board, square, charuco, model)
     from worker.jobs import intrinsics
 
     files = {str(path): path.read_bytes() for path in photos}
-    with report_job_failures(), progress_bar() as show:
+    with engine_progress() as show:
         for name, data in files.items():
             image_checks.check_photo(name, data, settings)
-        solution = intrinsics.solve(files, options, lambda step: show(step["stage"], step["fraction"]))
+        solution = intrinsics.solve(files, options, show)
     output.write_text(solution.result.model_dump_json(indent=2) + "\n")
     if picture is not None:
         picture.write_bytes(solution.pictures["coverage"])
@@ -141,15 +141,7 @@ def pose(
             help=f"The lens of each camera, as `esc intrinsics` writes it or by hand: {LENS_IN_HELP}.",
         ),
     ],
-    output: Annotated[
-        Path,
-        typer.Option(
-            "-o",
-            "--output",
-            callback=require_folder_of,
-            help="JSON file to write the venue to, for `esc venue put` and `esc run`.",
-        ),
-    ],
+    output: VenueOutput,
     frame: Annotated[
         list[str] | None,
         typer.Option("--frame", metavar="CAMERA=FILE", help="The frame that the points of a camera were clicked in."),
@@ -168,41 +160,37 @@ def pose(
     ] = None,
 ) -> None:
     """Find first poses of cameras from clicked points. Exit: 0 all found, 1 failed, 2 usage, 3 one rejected."""
-    from service.cli.local_engine import engine_settings
-    from service.schemas.geometry import LensFile, Pose, PoseIn
-    from service.schemas.options import ClickedPoints
-    from service.schemas.venue import CameraIn, Site, VenueIn
-
     engine_settings()
     place = parse_document(Site, site.read_bytes(), str(site))
     clicks = parse_document(ClickedPoints, points.read_bytes(), str(points)).root
-    given = {
+    lens_files = {
         camera: parse_document(LensFile, path.read_bytes(), str(path), LENS_EXAMPLE)
         for camera, (path, *_) in parse_frame_files(lenses).items()
     }
-    seen = {camera: path.read_bytes() for camera, (path, *_) in parse_frame_files(frame or []).items()}
-    for camera in given.keys() - clicks.keys():
+    images = {camera: path.read_bytes() for camera, (path, *_) in parse_frame_files(frame or []).items()}
+    for camera in lens_files.keys() - clicks.keys():
         fail(f"{points} has no points of camera {camera}, only of {', '.join(clicks)}", USAGE)
     from worker.jobs.from_schemas import JobFailedError, lens_of
     from worker.jobs.locate_all import locate_all
 
-    engine_lenses = {camera: lens_of(lens.intrinsics, lens.image_size) for camera, lens in given.items()}
+    engine_lenses = {camera: lens_of(lens.intrinsics, lens.image_size) for camera, lens in lens_files.items()}
     stored = {camera.id: Pose.from_input(camera.pose) for camera in place.cameras}
     found = {camera.id: camera for camera in place.cameras}
     results, failures = [], []
-    for camera, end in locate_all(place.field, engine_lenses, clicks, seen, stored).items():
-        if isinstance(end, JobFailedError):
-            failures.append(str(end))
+    for camera, outcome in locate_all(place.field, engine_lenses, clicks, images, stored).items():
+        if isinstance(outcome, JobFailedError):
+            failures.append(str(outcome))
             continue
-        result = end.result
+        result = outcome.result
         results.append(result)
         print_pose_summary(result)
         if pictures is not None:
-            pictures.mkdir(parents=True, exist_ok=True)
-            (pictures / f"points_{camera}.jpg").write_bytes(end.pictures["points"])
-        stands = PoseIn(rotation=result.pose.rotation, position=result.pose.position)
+            write_pictures(pictures, {f"points_{camera}": outcome.pictures["points"]})
+        pose_in = PoseIn(rotation=result.pose.rotation, position=result.pose.position)
         if result.accepted:
-            found[camera] = CameraIn(id=camera, image_size=result.image_size, intrinsics=result.intrinsics, pose=stands)
+            found[camera] = CameraIn(
+                id=camera, image_size=result.image_size, intrinsics=result.intrinsics, pose=pose_in
+            )
     if failures:
         fail("\n".join(failures), FAILED)
     if as_json or not sys.stdout.isatty():
@@ -236,19 +224,13 @@ def fit_field(
 
     A venue's file is fitted here, a stored venue by its service. What is stored stays as it is until `venue put`.
     """
-    import secrets
-
-    from service.schemas.options import FieldOptions
-
     options = FieldOptions(seed=secrets.randbelow(2**31) if seed is None else seed)
     if Path(venue).is_file():
         stored, result, drawn = _fit_locally(Path(venue), frames, options)
     else:
         stored, result, drawn = _fit_by_service(venue, frames, options, url, api_key)
     if pictures is not None:
-        pictures.mkdir(parents=True, exist_ok=True)
-        for name, picture in drawn.items():
-            (pictures / f"{name}.jpg").write_bytes(picture)
+        write_pictures(pictures, drawn)
     print_answer(result, as_json=as_json)
     if not result.accepted:
         raise typer.Exit(REJECTED)
@@ -258,27 +240,20 @@ def fit_field(
 
 
 def _fit_locally(file: Path, frames: list[str], options: FieldOptions) -> tuple[Venue, FieldResult, dict[str, bytes]]:
-    from service.cli.local_engine import checked_files, engine_settings, report_job_failures
-    from service.schemas.venue import VenueIn
-
     settings = engine_settings()
     from worker.compute_resources import ComputeResources
     from worker.jobs import field
 
     stored = parse_document(VenueIn, file.read_bytes(), str(file)).to_venue()
     files = checked_files(stored, frames, settings)
-    with report_job_failures(), progress_bar() as show:
-        solution = field.solve(
-            stored, files, options, ComputeResources.of(settings), lambda step: show(step["stage"], step["fraction"])
-        )
+    with engine_progress() as show:
+        solution = field.solve(stored, files, options, ComputeResources.of(settings), show)
     return stored, solution.result, solution.pictures
 
 
 def _fit_by_service(
     venue: str, frames: list[str], options: FieldOptions, url: str, api_key: str | None
 ) -> tuple[Venue, FieldResult, dict[str, bytes]]:
-    from service.schemas.results import FieldResult
-
     files = parse_frame_files(frames)
     if not re.fullmatch(ID_PATTERN, venue):
         fail(f"There is no file {venue}, and it is no id of a venue", USAGE)
@@ -294,8 +269,6 @@ def _fit_by_service(
 
 
 def _parse_lens_options(board: str, square: float, charuco: str | None, model: LensModel) -> IntrinsicsOptions:
-    from service.schemas.options import IntrinsicsOptions
-
     counted = re.fullmatch(r"(\d+)[x×](\d+)", board)
     if counted is None:
         fail(f"{board!r} is not COLUMNSxROWS, for instance 9x6", USAGE)

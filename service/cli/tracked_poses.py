@@ -1,4 +1,7 @@
-"""What `esc stitch --follow` makes beside the clip: poses in files, and what is to be said of how cameras moved."""
+"""Poses that `esc stitch --follow` writes beside the clip, and a summary of the movement of cameras.
+
+Imports the engine, see `local_engine`.
+"""
 
 from __future__ import annotations
 
@@ -6,25 +9,22 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from service.cli.printing import FAILED, fail, print_note
 from service.formats.clip import ClipPoses, TrackedCamera
 from service.formats.lens import NumberedCamera
 from service.schemas.problems import Problem
-
-if TYPE_CHECKING:
-    from service.schemas.venue import Camera, Venue
-    from worker.calibration.geometry import camera as engine
-    from worker.calibration.tracking.follower import TrackedMoment, TrackedPose
-    from worker.video.tracking import MotionSummary, TrackedGeometryFactory
+from service.schemas.venue import Camera, Venue
+from worker.calibration.geometry import camera as engine
+from worker.calibration.tracking.follower import TrackedMoment, TrackedPose
+from worker.jobs.to_schemas import lens_to_schema, pose_to_schema
+from worker.video.tracking import MotionSummary, TrackedGeometryFactory
 
 
 @contextmanager
 def tracking(venue: Venue, every: int, stem: Path | None, freed_axes: str) -> Iterator[TrackedGeometryFactory]:
-    """What follows the cameras of a clip, which is made inside; their poses go into files beside `stem`, if any."""
-    from worker.video.tracking import TrackedGeometryFactory
-
+    """Yield what tracks the cameras of a clip that the block makes, and write their poses to files `stem`.*, if any."""
     if stem is None:
         follow = TrackedGeometryFactory(every)
         yield follow
@@ -47,7 +47,7 @@ def tracking(venue: Venue, every: int, stem: Path | None, freed_axes: str) -> It
 
 
 def print_motions(motions: Mapping[str, MotionSummary]) -> None:
-    """Lines for whoever looks."""
+    """Print the largest turn of each camera and how its pictures were measured."""
     for camera, motion in motions.items():
         unseen = motion.how["coasted"], motion.how["refused"]
         print_note(
@@ -58,7 +58,7 @@ def print_motions(motions: Mapping[str, MotionSummary]) -> None:
 
 
 def motion_document(motion: MotionSummary) -> dict[str, Any]:
-    """The same for programs."""
+    """Return a summary of the movement of a camera for JSON."""
     return {
         "farthest_deg": round(motion.farthest_deg, 4),
         **{how: motion.how[how] for how in ("measured", "coasted", "refused")},
@@ -76,10 +76,7 @@ def _tracked_camera(followed: TrackedPose, numbers: Mapping[str, int]) -> Tracke
 
 
 def camera_document(camera: engine.Camera) -> Camera:
-    """Return the camera for the wire, with the lens of the clip's frames: they may be smaller than those it is of."""
-    from service.schemas.venue import Camera
-    from worker.jobs.to_schemas import lens_to_schema, pose_to_schema
-
+    """Return a camera of the engine as a schema, with the lens of its frames, which may be smaller than stored."""
     return Camera(
         id=camera.id,
         image_size=list(camera.intrinsics.size),

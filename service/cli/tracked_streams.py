@@ -1,4 +1,4 @@
-"""Cameras that `esc live` tracks in their streams, and what it sends of them."""
+"""Cameras that `esc live` tracks in their streams, and the poses that it sends of them."""
 
 from __future__ import annotations
 
@@ -9,22 +9,26 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Self
 
 from service.cli.arguments import require_cameras
+from service.cli.local_engine import engine_settings
 from service.cli.printing import OngoingTrouble, print_note
 from service.formats.lens import NumberedCamera
+from service.live.destinations import PoseSender, Tracked
 from service.live.reports import SILENT_S, SentPose
+from service.schemas.venue import Camera, Venue
 
 if TYPE_CHECKING:
-    from service.live.destinations import PoseSender
-    from service.schemas.venue import Camera, Venue
     from worker.video.live_tracking import LivePose, StreamTracker
 
-# Of a JPEG that a calibration is asked for with.
+# JPEG quality of the frames that are submitted for a calibration.
 FRAME_QUALITY = 95
 
 
 @dataclass
 class TrackedStreams:
-    """The cameras of a `venue` that are tracked, by their ids. `sent` is told of each pose after it was sent."""
+    """The cameras of a `venue` that are tracked, by their ids; `sent` is called with each pose after it was sent.
+
+    The engine is imported for tracked cameras alone: stored poses are sent without it.
+    """
 
     venue: Venue
     sender: PoseSender
@@ -46,13 +50,11 @@ class TrackedStreams:
         """Return the cameras of a venue of which a stream is given.
 
         `every`: lines are measured in every so many-th picture; `ahead_s`: poses are sent as they will be so long after
-        their pictures; `sent` is told of each.
+        their pictures; `sent` is called with each.
         """
         found = cls(venue, sender, sent)
         require_cameras(venue, addresses)
         if addresses:
-            from service.cli.local_engine import engine_settings
-
             engine_settings()
             from worker.jobs.from_schemas import camera_with_ignored_areas, pitch_of
             from worker.video.live_tracking import StreamTracker
@@ -69,21 +71,21 @@ class TrackedStreams:
 
     @cached_property
     def numbers(self) -> dict[str, int]:
-        """The place in the venue of each camera, from 1."""
+        """Number of each camera in the venue, from 1."""
         return {camera.id: number for number, camera in enumerate(self.venue.cameras, 1)}
 
     def start(self) -> None:
-        """Begin to track them."""
+        """Start the trackers."""
         for camera in self.cameras.values():
             camera.start()
 
     def stop(self) -> None:
-        """End."""
+        """Stop the trackers."""
         for camera in self.cameras.values():
             camera.stop()
 
     def anchor(self, stored: Sequence[Camera]) -> None:
-        """Begin anew from new stored poses."""
+        """Restart the trackers of cameras from new stored poses."""
         tracked = [camera for camera in stored if camera.id in self.cameras]
         if tracked:
             from worker.jobs.from_schemas import camera_with_ignored_areas
@@ -92,7 +94,7 @@ class TrackedStreams:
                 self.cameras[camera.id].anchor(camera_with_ignored_areas(camera, camera.ignore))
 
     def is_tracked(self, camera: str) -> bool:
-        """Whether poses of a camera come from its pictures at the moment."""
+        """True while poses of a camera come from its pictures."""
         return time.monotonic() - self._last_s.get(camera, -SILENT_S) < SILENT_S
 
     def lost(self, for_s: float) -> list[str]:
@@ -118,13 +120,12 @@ class TrackedStreams:
 
     def _report(self, pose: LivePose) -> None:
         from service.cli.tracked_poses import camera_document
-        from service.live.destinations import Tracked
 
         tracked = pose.tracked
         if tracked.how == "measured":
             self._trouble[tracked.camera.id].over(f"camera {tracked.camera.id} is tracked again")
         self._last_s[tracked.camera.id] = time.monotonic()
         shot = NumberedCamera(camera_document(tracked.camera), self.numbers[tracked.camera.id])
-        known = Tracked(tracked.sigma.rotation_deg, tracked.sigma.position_m, pose.clock, pose.arrived_ns)
-        self.sender.send([shot], pose.at_ns, pose.rate, tracked.how, known)
-        self.sent(SentPose(shot.camera, tracked.how, pose.number, pose.at_ns, known))
+        accuracy = Tracked(tracked.sigma.rotation_deg, tracked.sigma.position_m, pose.clock, pose.arrived_ns)
+        self.sender.send([shot], pose.at_ns, pose.rate, tracked.how, accuracy)
+        self.sent(SentPose(shot.camera, tracked.how, pose.number, pose.at_ns, accuracy))

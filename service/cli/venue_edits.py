@@ -1,4 +1,4 @@
-"""What changes a venue by hand: what would be lost by a file, patches in words, and an editor."""
+"""Changes of a venue by hand: losses by a file, patches of PART=VALUE, and an editor."""
 
 from __future__ import annotations
 
@@ -8,69 +8,63 @@ import os
 import shlex
 import subprocess
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from service.cli.printing import USAGE, fail
+from service.schemas.geometry import Pose
+from service.schemas.history import Revision
+from service.schemas.venue import Camera, Venue, VenueIn
 
-if TYPE_CHECKING:
-    from service.schemas.geometry import Pose
-    from service.schemas.history import Revision
-    from service.schemas.venue import Camera, Venue, VenueIn
-
-# Of a rotation in radians and a position in metres.
+# Distance of two poses, of rotations in radians and positions in metres, that counts as none.
 POSE_TOLERANCE = 1e-9
 
 
 def describe_losses(venue: Venue, stored: Venue, newest: Revision) -> list[str]:
-    """A line for each thing that somebody or a calibration gave a stored venue and that another one has not."""
+    """Return a line for each pose and setting of the stored venue that `venue` would replace or lacks."""
     return [*_lost_poses(venue, stored, newest), *_lost_settings(venue, stored)]
 
 
 def _lost_poses(venue: Venue, stored: Venue, newest: Revision) -> list[str]:
     if newest.cause == "put":
         return []
-    wanted = {camera.id: camera.pose for camera in venue.cameras}
-    others = [camera for camera in stored.cameras if _differ(camera.pose, wanted.get(camera.id))]
+    poses = {camera.id: camera.pose for camera in venue.cameras}
+    changed = [camera for camera in stored.cameras if _differ(camera.pose, poses.get(camera.id))]
     since = f"{newest.cause} {newest.at:%Y-%m-%d %H:%M} UTC, revision {newest.revision}"
-    return [f"the pose of camera {camera.id} ({since}); {_pose_difference_text(camera, wanted)}" for camera in others]
+    return [f"the pose of camera {camera.id} ({since}); {_pose_difference_text(camera, poses)}" for camera in changed]
 
 
 def _differ(pose: Pose, other: Pose | None) -> bool:
-    """Whether two poses are two; what one of them has lost by being written down and read again is none."""
+    """True if two poses differ by more than writing them to a file and reading them again changes."""
     return other is None or math.dist(pose.rotation + pose.position, other.rotation + other.position) > POSE_TOLERANCE
 
 
-def _pose_difference_text(camera: Camera, wanted: Mapping[str, Pose]) -> str:
-    if camera.id not in wanted:
+def _pose_difference_text(camera: Camera, poses: Mapping[str, Pose]) -> str:
+    if camera.id not in poses:
         return "the file has no such camera"
-    metres = math.dist(camera.pose.position, wanted[camera.id].position)
+    metres = math.dist(camera.pose.position, poses[camera.id].position)
     return f"by the file it stands {metres:.3f} m from there"
 
 
 def _lost_settings(venue: Venue, stored: Venue) -> list[str]:
     parts = ("alarms", "schedule", "webhooks", "view")
     lost = [f"{part}: the file has none" for part in parts if getattr(stored, part) and not getattr(venue, part)]
-    fetched = {camera.id for camera in venue.cameras if camera.source}
-    blind = [camera.id for camera in stored.cameras if camera.source and camera.id not in fetched]
-    told = {camera.id for camera in venue.cameras if camera.intrinsics.sigma}
-    untold = [camera.id for camera in stored.cameras if camera.intrinsics.sigma and camera.id not in told]
-    kept = {camera.id for camera in venue.cameras if camera.ignore}
-    seen_again = [camera.id for camera in stored.cameras if camera.ignore and camera.id not in kept]
-    return [
-        *lost,
-        *(f"the ignored areas of camera {camera}: the file has none" for camera in seen_again),
-        *(f"the source of camera {camera}: the file has none" for camera in blind),
-        *(f"the sigma of the lens of camera {camera}: the file has none" for camera in untold),
-    ]
+    camera_parts: dict[str, Callable[[Camera], object]] = {
+        "the ignored areas": lambda camera: camera.ignore,
+        "the source": lambda camera: camera.source,
+        "the sigma of the lens": lambda camera: camera.intrinsics.sigma,
+    }
+    for part, value in camera_parts.items():
+        given = {camera.id for camera in venue.cameras if value(camera)}
+        missing = [camera.id for camera in stored.cameras if value(camera) and camera.id not in given]
+        lost += [f"{part} of camera {camera}: the file has none" for camera in missing]
+    return lost
 
 
 def with_poses_of(venue: VenueIn, stored: Venue) -> VenueIn:
-    """A venue with the poses of another, and the lenses and the ridge that they belong to."""
-    from service.schemas.venue import VenueIn
-
-    # To the last digit: with both places, not with what one of them gives the other.
+    """Return a venue with the poses of the stored one, and the lenses and the ridge that they belong to."""
+    # Validated as input: rotation and position both stay as they are, to the last digit.
     known = {camera.id: camera for camera in VenueIn.model_validate(stored.model_dump()).cameras}
     cameras = [
         camera.model_copy(
@@ -88,30 +82,30 @@ def with_poses_of(venue: VenueIn, stored: Venue) -> VenueIn:
 
 
 def parse_patch(changes: Sequence[str]) -> dict[str, Any]:
-    """A merge patch of arguments PART=VALUE; after a dot comes a part of a part."""
+    """Return a JSON merge patch from arguments PART=VALUE; a dot goes down into a part."""
     patch: dict[str, Any] = {}
     for change in changes:
         path, equals, text = change.partition("=")
-        *way, last = path.split(".")
-        if not (equals and all((*way, last))):
+        *parents, name = path.split(".")
+        if not (equals and all((*parents, name))):
             fail(f"{change!r} is not PART=VALUE, for instance alarms.rejected_in_a_row=3", USAGE)
-        place = patch
-        for step in way:
-            place = place.setdefault(step, {})
-            if not isinstance(place, dict):
-                fail(f"{change!r}: {step} has another value already", USAGE)
-        place[last] = _parse_value(text)
+        part = patch
+        for parent in parents:
+            part = part.setdefault(parent, {})
+            if not isinstance(part, dict):
+                fail(f"{change!r}: {parent} has another value already", USAGE)
+        part[name] = _parse_value(text)
     return patch
 
 
 def merge_patch_between(before: Any, after: Any) -> Any:
-    """The merge patch that makes the one of the other; of what has ids, by them."""
+    """Return the JSON merge patch from one document to another; lists of objects with ids are merged by these."""
     before, after = _by_id(before), _by_id(after)
     if not (isinstance(before, dict) and isinstance(after, dict)):
         return after
-    gone = dict.fromkeys(before.keys() - after.keys())
-    others = {name: value for name, value in after.items() if name not in before or before[name] != value}
-    return gone | {name: merge_patch_between(before.get(name), value) for name, value in others.items()}
+    removed = dict.fromkeys(before.keys() - after.keys())
+    changed = {name: value for name, value in after.items() if name not in before or before[name] != value}
+    return removed | {name: merge_patch_between(before.get(name), value) for name, value in changed.items()}
 
 
 def _by_id(document: Any) -> Any:
@@ -127,7 +121,7 @@ def _parse_value(text: str) -> Any:
 
 
 def edit_text(text: str) -> str:
-    """What somebody makes of a text in the editor of their choice."""
+    """Let the user edit a text in $VISUAL or $EDITOR, and return the edited text."""
     editor = shlex.split(os.environ.get("VISUAL") or os.environ.get("EDITOR") or "vi")
     with tempfile.TemporaryDirectory(prefix="esc-edit-") as folder:
         file = Path(folder) / "venue.json"

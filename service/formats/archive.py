@@ -11,7 +11,7 @@ NO_TIME = (1980, 1, 1, 0, 0, 0)
 
 
 def archive(files: Mapping[str, bytes], *, compressed: bool = False, executable: Sequence[str] = ()) -> bytes:
-    """Files by name, as they are where what is large among them is compressed already, or `compressed` quickly."""
+    """Return a zip of files by their names, stored as they are or `compressed` quickly."""
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w") as content:
         for name, data in files.items():

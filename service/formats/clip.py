@@ -29,9 +29,9 @@ COLUMNS = (
 
 @dataclass(frozen=True)
 class TrackedCamera:
-    """A camera when a frame was taken, and how that is known.
+    """A camera at the time of a frame, with its uncertainty.
 
-    `status`: what the tracking says of it. `sigma` and `motion_sigma`: one standard deviation of its pose, and of its
+    `status`: that of the tracking. `sigma` and `motion_sigma`: one standard deviation of its pose, and of its
     motion since the first frame: of the rotation in degrees, of the position in metres.
     """
 
@@ -42,7 +42,7 @@ class TrackedCamera:
 
 
 class ClipPoses:
-    """Three files, `stem` with `.jsonl`, `.d1` and `.csv`: open while the clip runs, a frame after the other.
+    """Writer of three files, `stem` with `.jsonl`, `.d1` and `.csv`, that takes the frames of a clip one by one.
 
     A line of JSON, a packet and a row per camera and frame, the cameras of a frame one after the other. Raises
     `Problem` (`format-cannot-hold`) for a lens or place that a format has no room for: where the stored cameras have
@@ -67,7 +67,7 @@ class ClipPoses:
         self._rows.writerow(COLUMNS)
 
     def add(self, cameras: Sequence[TrackedCamera], rate: Fraction) -> None:
-        """The next frame of a clip of so many a second, its cameras in the order of the venue."""
+        """Write the next frame of a clip at `rate` frames a second, its cameras in the order of the venue."""
         for camera in cameras:
             frame = opentrackio.Frame(self._number, rate, camera.status)
             self._samples.write(opentrackio.write_frame(camera.shot, frame, self._angles))
@@ -90,5 +90,5 @@ class ClipPoses:
 
 
 def _beside(stem: Path, end: str) -> Path:
-    """A stem may have dots of its own."""
+    """Return a file beside the clip; its stem may contain dots."""
     return stem.with_name(f"{stem.name}.{end}")

@@ -19,7 +19,7 @@ MODELS = {
 
 
 def write(shots: Sequence[NumberedCamera]) -> bytes:
-    """The three files. Images are named as their cameras, with `.jpg`: the frames to put beside them.
+    """Return a zip of the three files. Images are named as their cameras, with `.jpg`: the frames to put beside them.
 
     Ids follow the names, as those of `feature_extractor` do: `point_triangulator` takes no model whose ids differ from
     those of its database.
@@ -35,7 +35,7 @@ def write(shots: Sequence[NumberedCamera]) -> bytes:
 
 
 def _name(shot: NumberedCamera) -> str:
-    """The file of the camera's frame."""
+    """Return the name of the file of a camera's frame."""
     return f"{shot.id}.jpg"
 
 
@@ -55,7 +55,7 @@ def _image(number: int, shot: NumberedCamera) -> str:
 
 
 def quaternion(rotation: Sequence[float]) -> list[float]:
-    """Unit quaternion (w, x, y, z) of a Rodrigues vector (rad)."""
+    """Return the unit quaternion (w, x, y, z) of a Rodrigues vector (rad)."""
     angle = math.hypot(*rotation)
     # sin(a/2)/a -> 1/2.
     scale = math.sin(angle / 2) / angle if angle > 1e-12 else 0.5

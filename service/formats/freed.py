@@ -28,7 +28,7 @@ AXIS = re.compile(r"(?P<sign>-?)(?P<name>[a-z]+)(?P<offset>[+-][0-9.]+)?")
 
 @dataclass(frozen=True)
 class EncoderCounts:
-    """What is sent as zoom and focus of a camera."""
+    """Counts that FreeD has for the zoom and the focus of a camera."""
 
     zoom: int = 0
     focus: int = 0
@@ -38,9 +38,9 @@ NO_ENCODERS = EncoderCounts()
 
 
 def write(shots: Sequence[NumberedCamera], axes: str, counts: Mapping[str, EncoderCounts] | None = None) -> bytes:
-    """A packet per camera, in the order of the venue; its id is the camera's place there, from 1.
+    """Return a packet per camera, in the order of the venue; its id is the number of the camera there, from 1.
 
-    `axes`: what is sent as X, Y, height, pan, tilt and roll: `x y z pan tilt roll`, or `y -x z -pan+90 tilt roll`;
+    `axes`: the values of X, Y, height, pan, tilt and roll: `x y z pan tilt roll`, or `y -x z -pan+90 tilt roll`;
     `counts`: by camera; of others they are 0.
     """
     return b"".join(_packet(shot, axes, (counts or {}).get(shot.id, NO_ENCODERS)) for shot in shots)
@@ -57,14 +57,14 @@ def _packet(shot: NumberedCamera, axes: str, counts: EncoderCounts) -> bytes:
 
 def _mapped(shot: NumberedCamera, axes: str) -> list[float]:
     pan, tilt, roll = pan_tilt_roll(product(transposed(shot.rotation), transposed(AHEAD_IS_Y)))
-    ours = dict(zip("xyz", shot.camera.pose.position, strict=True))
-    ours |= {"pan": -math.degrees(pan), "tilt": math.degrees(tilt), "roll": math.degrees(roll)}
-    found = [_value(match, ours) for match in AXIS.finditer(axes)]
+    values = dict(zip("xyz", shot.camera.pose.position, strict=True))
+    values |= {"pan": -math.degrees(pan), "tilt": math.degrees(tilt), "roll": math.degrees(roll)}
+    found = [_value(match, values) for match in AXIS.finditer(axes)]
     return found[:3] + [math.remainder(angle, 360) for angle in found[3:]]
 
 
-def _value(axis: re.Match[str], ours: dict[str, float]) -> float:
-    value = ours[axis["name"]] + 0.0
+def _value(axis: re.Match[str], values: dict[str, float]) -> float:
+    value = values[axis["name"]] + 0.0
     return (-value if axis["sign"] else value) + float(axis["offset"] or 0)
 
 

@@ -1,4 +1,4 @@
-"""What every format needs to know of a camera: its numbers by name, and what its lens has that a format cannot say."""
+"""A camera as the formats take it: its numbers by name, and a check that a format can hold its lens."""
 
 from __future__ import annotations
 
@@ -20,25 +20,25 @@ Matrix = list[list[float]]
 
 @dataclass(frozen=True)
 class NumberedCamera:
-    """A camera with its pose, and its place among the cameras of its venue, from 1: some formats know numbers only."""
+    """A camera with its pose and its number in the venue, from 1, which formats without names have."""
 
     camera: Camera
     number: int
 
     @property
     def id(self) -> str:
-        """The camera's."""
+        """Id of the camera."""
         return self.camera.id
 
     @property
     def focal(self) -> tuple[float, float]:
-        """fx, fy in pixels."""
+        """Focal lengths fx, fy in pixels."""
         (fx, _, _), (_, fy, _), _ = self.camera.intrinsics.matrix
         return fx, fy
 
     @property
     def principal(self) -> tuple[float, float]:
-        """cx, cy in pixels, pixel centres at integers."""
+        """Principal point cx, cy in pixels, pixel centres at integers."""
         (_, _, cx), (_, _, cy), _ = self.camera.intrinsics.matrix
         return cx, cy
 
@@ -50,20 +50,20 @@ class NumberedCamera:
 
     @property
     def coefficients(self) -> dict[str, float]:
-        """All of `COEFFICIENTS`, absent ones zero."""
+        """Distortion coefficients by their names in `COEFFICIENTS`, absent ones zero."""
         given = self.camera.intrinsics.distortion
         return dict(zip(COEFFICIENTS, [*given, *[0.0] * (len(COEFFICIENTS) - len(given))], strict=True))
 
     @property
     def rotation(self) -> Matrix:
-        """The matrix (3, 3), world to camera."""
+        """Rotation matrix (3, 3), world to camera."""
         columns = [
             rotate(self.camera.pose.rotation, axis) for axis in ([1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0])
         ]
         return [list(row) for row in zip(*columns, strict=True)]
 
-    def require_support(self, name: str, held: Collection[str]) -> None:
-        """Refuse a lens that has more than skew 0 and the coefficients `held`: what is left out is pixels wrong."""
+    def require_support(self, name: str, supported: Collection[str]) -> None:
+        """Refuse a lens with skew or coefficients that are not `supported`: without them points are pixels off."""
         if self.camera.intrinsics.model == "fisheye":
             raise Problem(
                 "format-cannot-hold",
@@ -71,7 +71,7 @@ class NumberedCamera:
                 camera=self.id,
                 got=["fisheye"],
             )
-        beyond = [key for key, value in self.coefficients.items() if value != 0 and key not in held]
+        beyond = [key for key, value in self.coefficients.items() if value != 0 and key not in supported]
         if self.camera.intrinsics.matrix[0][1] != 0:
             beyond.append("skew")
         if beyond:
@@ -85,10 +85,10 @@ class NumberedCamera:
 
 
 def product(a: Matrix, b: Matrix) -> Matrix:
-    """The product of two matrices."""
+    """Return the product of two matrices."""
     return [[sum(x * y for x, y in zip(row, column, strict=True)) for column in zip(*b, strict=True)] for row in a]
 
 
 def transposed(matrix: Matrix) -> Matrix:
-    """Rows to columns."""
+    """Return the transpose of a matrix."""
     return [list(row) for row in zip(*matrix, strict=True)]

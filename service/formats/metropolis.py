@@ -35,7 +35,7 @@ NOWHERE = {"lat": 0.0, "lng": 0.0}
 
 
 def write(shots: Sequence[NumberedCamera]) -> bytes:
-    """All cameras in one object. Raises `Problem` for a fisheye, a skew and a camera that sees no ground."""
+    """Return all cameras in one object. Raises `Problem` for a fisheye, a skew and a camera that sees no ground."""
     sensors = [_sensor(shot) for shot in shots]
     document = {"version": "1.0", "osmURL": "", "calibrationType": "cartesian", "sensors": sensors}
     return (json.dumps(document, indent=2) + "\n").encode()
@@ -80,7 +80,7 @@ def _sensor(shot: NumberedCamera) -> dict[str, Any]:
 
 
 def _ground_points(shot: NumberedCamera) -> Iterator[tuple[tuple[int, int], tuple[float, float]]]:
-    """Pixels (column, row) of the picture without distortion, and x, y of the ground (z = 0) that they show."""
+    """Return pixels (column, row) of the undistorted picture, and x, y of the ground (z = 0) that they show."""
     width, height = shot.size
     for row in (round(height * (number + 0.5) / ROWS) for number in range(ROWS)):
         for column in (round(width * (number + 0.5) / COLUMNS) for number in range(COLUMNS)):
@@ -90,7 +90,7 @@ def _ground_points(shot: NumberedCamera) -> Iterator[tuple[tuple[int, int], tupl
 
 
 def _ground_behind(shot: NumberedCamera, column: int, row: int) -> tuple[float, float] | None:
-    """x, y of the ground (z = 0) that a pixel of the picture without distortion shows; None for the sky and far off."""
+    """Return x, y of the ground (z = 0) that a pixel of the undistorted picture shows; None: sky, or far off."""
     (fx, fy), (cx, cy) = shot.focal, shot.principal
     in_camera = [[(column - cx) / fx], [(row - cy) / fy], [1.0]]
     (right,), (ahead,), (up,) = product(transposed(shot.rotation), in_camera)

@@ -14,7 +14,7 @@ NO_DISTORTION = [0.0] * 5
 
 
 def write(shot: NumberedCamera) -> bytes:
-    """Image size, camera matrix, distortion in OpenCV's order, rvec and tvec (world to camera, m)."""
+    """Return image size, camera matrix, distortion in OpenCV's order, rvec and tvec (world to camera, m)."""
     shot.require_support(
         "opencv", COEFFICIENTS
     )  # its matrix could hold a skew, but `cv2.projectPoints` does not read it

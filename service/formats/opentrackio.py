@@ -34,9 +34,9 @@ UNKNOWN = "unknown"
 
 @dataclass(frozen=True)
 class SampleTime:
-    """When a sample that is sent was taken: `unix_ns` by the clock of the machine, the `number` of the sample from 0.
+    """Time of a sample of a stream: `unix_ns` by the clock of the machine, and the `number` of the sample from 0.
 
-    `rate`: samples a second; `status`: of the tracking.
+    `rate`: samples a second; `status`: that of the tracking.
     """
 
     unix_ns: int
@@ -47,7 +47,7 @@ class SampleTime:
 
 @dataclass(frozen=True)
 class Frame:
-    """Which frame of a clip a sample is of: its `number` from 0, at `rate` a second. `status`: of the tracking."""
+    """A frame of a clip: its `number` from 0, at `rate` frames a second; `status`: that of the tracking."""
 
     number: int
     rate: Fraction
@@ -75,12 +75,12 @@ class SteadyAngles:
 
 
 def write(shot: NumberedCamera) -> bytes:
-    """One sample of a camera that stands still: it names a pose, not a moment of a stream."""
+    """Return a sample of a camera that stands still, without timing."""
     return (json.dumps(_with_sample_id(_sample(shot, _pan_tilt_roll_deg(shot))), indent=2) + "\n").encode()
 
 
 def write_frame(shot: NumberedCamera, frame: Frame, angles: SteadyAngles) -> bytes:
-    """One sample of a clip, a line of JSON. Its timecode counts from 00:00:00:00 at the first frame, without drops.
+    """Return a sample of a clip, a line of JSON. Its timecode is 00:00:00:00 at the first frame, and has no drops.
 
     The samples travel beside the video, whose frames they are of: nobody knows by a clock when those were taken.
     """
@@ -97,7 +97,7 @@ def write_frame(shot: NumberedCamera, frame: Frame, angles: SteadyAngles) -> byt
 
 
 def write_moment(shot: NumberedCamera, moment: SampleTime, angles: SteadyAngles) -> bytes:
-    """One sample of a stream, compact JSON. Its timestamp is UTC in seconds since 1970 by the sender's clock."""
+    """Return a sample of a stream, compact JSON. Its timestamp is UTC in seconds since 1970 by the sender's clock."""
     seconds, nanoseconds = divmod(moment.unix_ns, 1_000_000_000)
     timing = {
         "tracker": {"status": moment.status},
@@ -124,12 +124,12 @@ def _sample(shot: NumberedCamera, angles: tuple[float, float, float]) -> dict[st
 
 
 def _with_sample_id(sample: dict[str, Any]) -> dict[str, Any]:
-    """The same sample has the same id."""
+    """Add an id, which is the same for the same sample."""
     return sample | {"sampleId": uuid.uuid5(SOURCES, json.dumps(sample, sort_keys=True)).urn}
 
 
 def _timecode(frame: Frame) -> dict[str, Any]:
-    """Counted in whole frames a second, as timecode without drops is: 29.97 by 30."""
+    """Return the timecode of a frame, without drops: counted in whole frames a second, 29.97 by 30."""
     a_second = math.ceil(frame.rate)
     if a_second > MOST_FRAMES:
         raise Problem(
@@ -218,7 +218,7 @@ def _pan_tilt_roll_deg(shot: NumberedCamera) -> tuple[float, float, float]:
 
 
 def pan_tilt_roll(b: list[list[float]]) -> tuple[float, float, float]:
-    """Intrinsic z-x-y angles in radians of a matrix (3, 3), camera (x right, y ahead, z up) to world."""
+    """Return the intrinsic z-x-y angles, in radians, of a matrix (3, 3), camera (x right, y ahead, z up) to world."""
     tilt = math.asin(max(-1.0, min(1.0, b[2][1])))
     if math.hypot(b[0][1], b[1][1]) < 1e-9:
         # Straight up or down: pan and roll turn about the same axis; the pan takes it all.

@@ -9,5 +9,5 @@ from service.formats.lens import NumberedCamera
 
 
 def write(shots: Sequence[NumberedCamera]) -> bytes:
-    """All cameras in one object."""
+    """Return all cameras in one object."""
     return (json.dumps({"cameras": [shot.camera.model_dump(mode="json") for shot in shots]}, indent=2) + "\n").encode()

@@ -16,7 +16,7 @@ NO_DISTORTION = [0.0] * 5
 
 
 def write(shots: Sequence[NumberedCamera]) -> bytes:
-    """A table for each camera, `cam_01` for the first of the venue; `name` is the camera's id.
+    """Return a table for each camera, `cam_01` for the first of the venue; `name` is the camera's id.
 
     Ids are not the tables' names: readers sort these, and take `metadata` or `charuco` for something else.
     """

@@ -13,7 +13,7 @@ from service.formats.lens import RADIAL, TANGENTIAL, THIN_PRISM, Matrix, Numbere
 
 
 def write(shot: NumberedCamera) -> bytes:
-    """The parameters of a camera: pixels, degrees, metres."""
+    """Return the parameters of a camera: pixels, degrees, metres."""
     shot.require_support("soccernet", {*RADIAL, *TANGENTIAL, *THIN_PRISM})
     # y and z turn round: half a turn about x.
     orientation = transposed([[right, -down, -ahead] for right, down, ahead in shot.rotation])
@@ -36,7 +36,7 @@ def write(shot: NumberedCamera) -> bytes:
 
 
 def _pan_tilt_roll(o: Matrix) -> tuple[float, float, float]:
-    """z-x-z angles in radians of an orientation (3, 3)."""
+    """Return the z-x-z angles, in radians, of an orientation (3, 3)."""
     level = math.hypot(o[2][0], o[2][1])
     tilt = math.atan2(level, o[2][2])
     if level < 1e-9:

@@ -21,7 +21,7 @@ def write(
     program: Sequence[str],
     environment: Mapping[str, str],
 ) -> bytes:
-    """Both directions; `origin`: the corner that green counts from."""
+    """Return a zip of the maps of both directions; `origin`: the corner that green counts from."""
     if not _turn.acquire(blocking=False):
         raise Problem("unavailable", "Another set of ST maps is being made.", headers={"Retry-After": "10"})
     try:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Protocol
 
 from service.formats import colmap, freed, metropolis, opencv, opentrackio, plain, pose2sim, soccernet, stmap
 from service.formats.archive import archive
@@ -18,7 +18,7 @@ JSON, ZIP = "application/json", "application/zip"
 
 
 def export_formats(settings: Settings) -> Mapping[FormatName, Format]:
-    """Every format: what its file is, what it is called after its dot, and what writes it."""
+    """Return every format by its name."""
     maps = partial(stmap.write, program=settings.map_program, environment=settings.native_environment)
     return {
         "json": AllCamerasFormat(JSON, "json", plain.write),
@@ -36,58 +36,49 @@ def export_formats(settings: Settings) -> Mapping[FormatName, Format]:
 
 @dataclass(frozen=True)
 class ExportedFile:
-    """A file to hand out."""
+    """A file that an answer has as its body."""
 
     content: bytes
     media_type: str
     suffix: str
 
 
-class Format(Protocol):
-    """What all formats can do."""
-
-    def document(self, shots: Sequence[NumberedCamera]) -> ExportedFile:
-        """The file of these cameras, at least one."""
-
-
 @dataclass(frozen=True)
-class AllCamerasFormat:
-    """One file holds all cameras."""
+class Format(ABC):
+    """A file format: its media type, the suffix of its files, and the function that writes one."""
 
     media_type: str
     suffix: str
-    write: Callable[[Sequence[NumberedCamera]], bytes]
+    write: Callable[..., bytes]
+
+    @abstractmethod
+    def document(self, shots: Sequence[NumberedCamera]) -> ExportedFile:
+        """Return the file of these cameras, at least one."""
+
+
+class AllCamerasFormat(Format):
+    """A format whose file holds all cameras; `write` takes them."""
 
     def document(self, shots: Sequence[NumberedCamera]) -> ExportedFile:
-        """The file of these cameras."""
+        """Return the file of these cameras."""
         return ExportedFile(self.write(shots), self.media_type, self.suffix)
 
 
-@dataclass(frozen=True)
-class FilePerCameraFormat:
-    """A file holds one camera; those of several come in a zip, named as the cameras."""
-
-    media_type: str
-    suffix: str
-    write: Callable[[NumberedCamera], bytes]
+class FilePerCameraFormat(Format):
+    """A format whose file holds one camera, which `write` takes; the files of several come in a zip."""
 
     def document(self, shots: Sequence[NumberedCamera]) -> ExportedFile:
-        """The file of the camera, or a zip."""
+        """Return the file of the camera, or a zip of files that are named as the cameras."""
         if len(shots) == 1:
             return ExportedFile(self.write(shots[0]), self.media_type, self.suffix)
         return ExportedFile(archive({f"{shot.id}.{self.suffix}": self.write(shot) for shot in shots}), ZIP, "zip")
 
 
-@dataclass(frozen=True)
-class OneCameraFormat:
-    """A file holds one camera, and those of several would be too much for one answer."""
-
-    media_type: str
-    suffix: str
-    write: Callable[[NumberedCamera], bytes]
+class OneCameraFormat(Format):
+    """A format whose file holds one camera, and is too large for more than one in an answer."""
 
     def document(self, shots: Sequence[NumberedCamera]) -> ExportedFile:
-        """The file of the camera."""
+        """Return the file of the camera; refuse more than one."""
         if len(shots) > 1:
             ids = [shot.id for shot in shots]
             raise Problem("camera-needed", f"Say which, for instance camera={ids[0]}.", expected=ids)

@@ -8,7 +8,7 @@ from pathlib import Path
 from subprocess import PIPE, CompletedProcess
 from unittest.mock import patch
 
-from service.cli.main import main
+from service.cli.main import COMMANDS, load_command, main
 from service.observability import logs
 from tests.e2e import warm
 
@@ -36,6 +36,14 @@ def esc_here(folder: Path, *arguments: str, **environment: str) -> CompletedProc
             code = end.code or 0
     out.flush()
     return CompletedProcess(arguments, code, out.buffer.getvalue().decode(errors="replace"), err.getvalue())
+
+
+def all_commands():
+    """Yield every command and group of commands of `esc`, with the words that call it."""
+    waiting = [(name, load_command(name)) for name in COMMANDS]
+    for words, command in waiting:
+        yield words, command
+        waiting += [(f"{words} {name}", one) for name, one in getattr(command, "commands", {}).items()]
 
 
 def esc_process(folder: Path, *arguments: str, **environment: str) -> CompletedProcess:

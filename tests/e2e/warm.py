@@ -25,7 +25,14 @@ from pathlib import Path
 
 PR_SET_CHILD_SUBREAPER = 36
 # All that a service, a worker or a command loads sooner or later.
-IMPORTED = ("service.cli.main", "service.serving", "worker.supervisor", "service.client", "psycopg", "alembic.command")
+IMPORTED = (
+    "service.cli.main",
+    "service.cli.serve",
+    "service.cli.worker",
+    "service.cli.venues",
+    "psycopg",
+    "alembic.command",
+)
 # What the interpreter reads as it starts.
 OF_THE_INTERPRETER = "PYTHON"
 LONGEST_REQUEST = 1 << 20

@@ -13,9 +13,9 @@ import pytest
 from typer.main import get_command
 
 from service import build
-from service.cli.main import app_of
+from service.cli.main import app
 from service.store.database import SCHEMA_TABLE, connect, migrate, writing
-from tests.e2e.commands import esc_here, esc_process
+from tests.e2e.commands import all_commands, esc_here, esc_process
 from tests.e2e.running import FRAMES, keys_in, png, venue, wait_for
 from tests.unprivileged import drop_capabilities
 
@@ -84,8 +84,6 @@ def test_the_names_of_a_sports_points_are_listed(esc):
     assert "left near corner\t-11.88\t-5.49" in listed.stdout.splitlines()
     assert "far doubles sideline, {distance} m from the left baseline" in listed.stdout.splitlines()
     assert esc("pose", "--points", "soccer").stdout == esc("pose", "--points", "football").stdout
-    unknown = esc("pose", "--points", "quidditch")
-    assert (unknown.returncode, "football" in unknown.stderr) == (2, True)
 
 
 def test_a_wrong_venue_file_is_a_usage_error(esc, tmp_path):
@@ -161,8 +159,6 @@ def test_parts_of_a_venue_are_set_by_name(service, esc, name):
     assert (after["name"], after["alarms"]["rejected_in_a_row"]) == ("Main pitch", 3)
     assert after["cameras"][0] == before["cameras"][0] | {"source": "http://127.0.0.1/x"}
     assert json.loads(esc("venue", "set", name, "alarms=null").stdout)["alarms"] is None
-    for wrong in ("name", "=x", "a..b=1"):
-        assert esc("venue", "set", name, wrong).returncode == 2
 
 
 @pytest.mark.parametrize(("behaviour", "code"), [("accept", 0), ("fail", 1), ("reject", 3), ("partly", 3)])
@@ -247,11 +243,6 @@ def test_a_busy_service_is_told_apart(service, esc, name):
     service.http.post(f"/jobs/{job}/cancel")
 
 
-def test_usage_errors_are_told_before_anything_is_sent(esc):
-    for arguments in (("left",), ("left=nowhere.png",), ("=x",), (*FRAMES, "--options", "{")):
-        assert esc("calibrate", "v", *arguments).returncode == 2
-
-
 def test_refused_frames_are_a_failure_and_an_absent_service_may_come_back(service, esc, name):
     service.venue(name)
     refused = esc("calibrate", name, "left=left.png")
@@ -259,12 +250,6 @@ def test_refused_frames_are_a_failure_and_an_absent_service_may_come_back(servic
     absent = esc("calibrate", name, *FRAMES, ESC_URL="http://127.0.0.1:9")
     assert (absent.returncode, "http://127.0.0.1:9 cannot be reached" in absent.stderr) == (75, True)
     assert "Traceback" not in refused.stderr + absent.stderr
-
-
-@pytest.mark.parametrize("url", ["127.0.0.1:8000", "ftp://127.0.0.1", ""])
-def test_an_address_that_is_none_is_a_usage_error(esc, url):
-    answer = esc("venue", "list", "--url", url)
-    assert (answer.returncode, "no address such as http://" in answer.stderr) == (2, True), answer.stderr
 
 
 def test_a_file_that_cannot_be_written_is_told_in_a_line(service, esc, name):
@@ -309,8 +294,6 @@ def test_the_trend_of_a_venue_is_a_line_per_camera_and_that_of_a_camera_a_line_p
     assert night[1:] == ["too-few-nights", "2.5", "1.7", "+0.010%"]
     assert json.loads(esc("venue", "trend", name, "left", "--json").stdout)["points"][0]["jobs"] == 2
     assert esc("venue", "trend", name, "left", "--since", "2999-01-01").stdout == ""
-    refused = esc("venue", "trend", name, "--since", "yesterday")
-    assert (refused.returncode, "2026-11-03" in refused.stderr) == (2, True)
 
 
 def test_a_venue_is_followed_line_by_line_until_it_is_deleted(service, name):
@@ -332,24 +315,6 @@ def test_a_venue_is_followed_line_by_line_until_it_is_deleted(service, name):
     assert what == [*poses, ["venue.deleted", "-"]]
     assert (documents[-2]["type"], documents[-2]["data"]["id"]) == ("job.succeeded", job)
     assert documents[-1]["type"] == "venue.deleted"
-
-
-@pytest.mark.parametrize(
-    ("command", "says"), [(("job", "get", "01ABC"), "26 capital"), (("venue", "get", "A B"), "64 small letters")]
-)
-def test_an_id_that_is_none_is_told_in_words(esc, command, says):
-    answer = esc(*command)
-    assert (answer.returncode, says in " ".join(answer.stderr.replace("│", " ").split())) == (2, True), answer.stderr
-
-
-@pytest.mark.parametrize(
-    "command",
-    [("venue", "put", "left.png"), ("pose", "left.png", "left.png", "left=left.png", "-o", "first.json")],
-)
-def test_a_picture_in_place_of_a_document_is_told(esc, command):
-    answer = esc(*command)
-    assert answer.returncode == 2
-    assert answer.stderr.startswith("left.png: Invalid JSON"), answer.stderr
 
 
 def test_each_part_of_a_venue_that_is_wrong_is_told_once(service, esc, name):
@@ -418,18 +383,16 @@ def test_a_shell_is_taught_the_commands():
     assert completed.stdout.split() == ["wait"]
 
 
+def test_the_form_of_a_lens_file_is_printed_whole_with_its_brackets(tmp_path):
+    said = esc_here(tmp_path, "pose", "--help", COLUMNS="400").stdout
+    assert '"matrix": [[fx, 0, cx], [0, fy, cy], [0, 0, 1]], "distortion": [k1, k2, p1, p2, k3]' in said
+
+
 def test_every_option_and_argument_says_what_it_is_for():
-    for path, command in commands(get_command(app_of([]))):
+    for words, command in [("", get_command(app)), *all_commands()]:
         for parameter in command.params:
             said = getattr(parameter, "help", None) or ""
-            assert len(said.split()) >= 3, f"{path} {parameter.name}: {said!r}"
-
-
-def commands(command, *path):
-    """Every command below one, with the words that call it."""
-    for name, one in getattr(command, "commands", {}).items():
-        yield from commands(one, *path, name)
-    yield " ".join(path), command
+            assert len(said.split()) >= 3, f"{words} {parameter.name}: {said!r}"
 
 
 def test_a_frame_of_another_size_is_refused_with_both_sizes(service, esc, name, tmp_path):
@@ -467,51 +430,10 @@ def test_a_port_in_use_is_told(service, tmp_path):
     assert "--port chooses another" in answer.stderr
 
 
-@pytest.mark.parametrize(
-    ("command", "words"),
-    [
-        (("job", "list", "--limit", "0"), "'--limit': expected 1 or more, came '0'"),
-        (("job", "list", "--status", "asleep"), "'--status': 'asleep' is not one of 'queued', "),
-        (("venue", "restore", "main", "first"), "'revision': expected a whole number, came 'first'"),
-        (("serve", "--port", "http"), "'--port': expected a whole number, came 'http'"),
-        (("serve", "--port", "99999"), "--port: expected 65535 or less, came 99999"),
-        (("serve", "--port", "0", "--host", "nowhere.invalid"), "Cannot listen on nowhere.invalid:0: no such host."),
-        (("live", "venue.json", "--json", "--interface", "300.1.1.1"), "'--interface': expected an IPv4 address"),
-        (("field", "fit", "venue.json", "left=left.png", "-o", "no/venue.json"), "'--output': there is no folder no"),
-    ],
-)
-def test_a_value_that_is_wrong_is_told_in_words(tmp_path, command, words):
-    (tmp_path / "venue.json").write_text(json.dumps(venue("v")))
-    (tmp_path / "left.png").write_bytes(png())
-    answer = esc_here(tmp_path, *command, COLUMNS="200")
-    assert (answer.returncode, words in " ".join(answer.stderr.replace("│", " ").split())) == (2, True), answer.stderr
-
-
-def test_a_wrong_setting_is_told(tmp_path):
-    answer = esc_here(tmp_path, "serve", ESC_QUEUE_LIMIT="many")
-    assert answer.returncode == 2
-    assert answer.stderr == "ESC_QUEUE_LIMIT: expected a whole number, came 'many'\n"
-    assert esc_here(tmp_path, "serve", ESC_DRAIN_S="-1").stderr == "ESC_DRAIN_S: expected 0 s or more, came '-1'\n"
-    assert esc_here(tmp_path, "serve", ESC_DATABASE_URL="mysql://x").stderr.startswith("ESC_DATABASE_URL: expected is ")
-
-
-@pytest.mark.parametrize("command", [("serve",), ("up",), ("worker",), ("key", "list")])
-def test_a_misspelt_setting_is_refused_with_the_name_that_was_meant(tmp_path, command):
-    answer = esc_here(tmp_path, *command, ESC_KEEP_FRAME_DAYS="2")
-    assert (answer.returncode, answer.stdout) == (2, "")
-    assert answer.stderr == "unknown setting ESC_KEEP_FRAME_DAYS: did you mean ESC_KEEP_FRAMES_DAYS?\n"
-
-
 def test_a_misspelt_variable_of_a_command_that_calls_a_service_is_a_warning(service, tmp_path):
     answer = esc_here(tmp_path, "venue", "list", ESC_URL=service.url, ESC_APIKEY="esc_x")
     assert answer.returncode == 0
     assert answer.stderr == "Warning: ESC_APIKEY is not read: did you mean ESC_API_KEY?\n"
-
-
-def test_a_list_among_the_settings_that_is_no_json_is_told_in_a_line(tmp_path):
-    answer = esc_here(tmp_path, "serve", ESC_SOURCES="127.0.0.1")
-    assert (answer.returncode, answer.stdout) == (2, "")
-    assert answer.stderr == 'ESC_SOURCES: expected a list in JSON, for instance ["127.0.0.1"]\n'
 
 
 @pytest.mark.parametrize("command", [("serve", "--port", "0"), ("worker",)])
@@ -530,6 +452,11 @@ def test_a_data_folder_that_cannot_be_made_is_told_by_its_name(tmp_path, command
     answer = esc_here(tmp_path, *command, "--data", folder)
     assert (answer.returncode, answer.stdout) == (1, "")
     assert answer.stderr.startswith(f"The data folder {folder} cannot be written: {why}"), answer.stderr
+    if command[0] == "serve":
+        url = f"sqlite:///{tmp_path}/{folder}/esc.sqlite"
+        answer = esc_here(tmp_path, *command, ESC_DATABASE_URL=url)
+        assert answer.stderr.startswith(f"The data folder {tmp_path}/{folder} cannot be written: {why}"), answer.stderr
+        assert answer.stderr.endswith("ESC_DATABASE_URL names another.\n")
 
 
 def test_a_data_folder_without_rights_is_told_by_its_name(tmp_path):
@@ -541,13 +468,6 @@ def test_a_data_folder_without_rights_is_told_by_its_name(tmp_path):
         answer = thread.submit(subprocess.run, command, capture_output=True, text=True).result()
     assert answer.returncode == 1
     assert answer.stderr.startswith(f"The data folder {folder} cannot be written: this user has no right to.")
-
-
-def test_an_address_of_a_database_whose_folder_cannot_be_made_is_told_by_its_setting(tmp_path):
-    (tmp_path / "file").touch()
-    answer = esc_here(tmp_path, "serve", "--port", "0", ESC_DATABASE_URL=f"sqlite:///{tmp_path}/file/esc.sqlite")
-    told = f"The data folder {tmp_path}/file cannot be written: it is a file. ESC_DATABASE_URL names another.\n"
-    assert (answer.returncode, answer.stderr) == (1, told)
 
 
 def test_a_file_that_is_no_database_is_told_by_its_name(tmp_path):
@@ -624,24 +544,6 @@ def test_a_number_of_the_field_that_a_job_offers_is_stored_by_name(service, esc,
     assert history[2:4] == ["adopted", job]
     beyond = esc("venue", "adopt", name, "--field", "length_m", "--job", job)
     assert (beyond.returncode, "60 to 130 m" in beyond.stderr) == (1, True)
-
-
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        (),
-        ("left", "--field", "length_m"),
-        ("--field", "length_m"),
-        ("left", "--job", "0" * 26),
-        ("--job", "7"),
-        ("left", "--found", "0" * 26),
-        ("left", "--candidate", "left=2"),
-        ("--found", "0" * 26, "--candidate", "left"),
-    ],
-)
-def test_either_a_lens_is_stored_or_a_number_of_the_field_or_found_cameras(esc, arguments):
-    refused = esc("venue", "adopt", "main", *arguments)
-    assert (refused.returncode, refused.stdout) == (2, "")
 
 
 def test_a_lens_without_a_sigma_is_told_beside_the_venue(service, esc, name, tmp_path):

@@ -73,6 +73,16 @@ async def look(url, name):
 
 asyncio.run(look(*sys.argv[1:]))
 """
+IMPORTED = """
+import esc_client
+from importlib import import_module
+from pkgutil import walk_packages
+for module in walk_packages(esc_client.__path__, "esc_client."):
+    try:
+        import_module(module.name)
+    except ModuleNotFoundError as missing:
+        print(module.name, missing.name)
+"""
 READ = """
 import sys
 from esc_client import Client
@@ -189,7 +199,14 @@ def test_the_wheel_has_the_client_and_nothing_that_it_does_not_reach(wheel):
         "esc_client/fields/football.toml",
     } <= shipped
     assert not {name for name in shipped if re.search("programs|callback_urls|hosts|findings|landmarks", name)}
-    assert not re.search(r"^\s*(from|import) (service|fields|fastapi|sqlalchemy)\b", text, re.MULTILINE)
+    imported = set(re.findall(r"^\s*(?:from|import) (\w+)", text, re.MULTILINE))
+    # The last two may be missing, see below.
+    assert imported - sys.stdlib_module_names == {"esc_client", "httpx", "pydantic", "croniter", "numpy"}
+
+
+def test_every_module_is_imported_where_nothing_else_of_esc_is(program):
+    # NumPy is not asked for: the service alone judges what a lens does over its picture.
+    assert program(IMPORTED) == ["esc_client.schemas.lens_map numpy"]
 
 
 def test_its_version_is_that_of_the_service(wheel, program):
@@ -251,29 +268,9 @@ def test_programs_that_use_it_are_type_checked(python, tmp_path):
     ]
 
 
-@pytest.mark.parametrize(
-    ("statement", "why"),
-    [
-        ("import service.schemas.names", "`import service.schemas.names` is not rewritten"),
-        ("from .schemas import names", "a relative import is not rewritten"),
-        ("from  service.schemas import names", "an import in an unusual form is not rewritten"),
-        ("import importlib; importlib.import_module('service.schemas.names')", "computed is not rewritten"),
-        ("def late():\n    import sqlalchemy", "sqlalchemy is no dependency of the client"),
-    ],
-)
-def test_what_cannot_become_part_of_it_fails_the_build(tmp_path, statement, why):
-    source = copied(tmp_path / "source")
-    with (source / "service" / "client_errors.py").open("a") as module:
-        module.write(f"\n\n{statement}\n")
-    command = [sys.executable, "setup.py", "--quiet", "build_py"]
-    built = subprocess.run(command, cwd=source / "client", capture_output=True, text=True)
-    assert built.returncode != 0
-    assert re.search(rf"Unfit: service/client_errors.py, line \d+: .*{re.escape(why)}", built.stderr)
-
-
 def test_it_is_not_installed_as_editable_which_would_have_no_modules(tmp_path):
     source = copied(tmp_path / "source")
     asked = [sys.executable, "-c", "from setuptools.build_meta import build_editable; build_editable('.')"]
     built = subprocess.run(asked, cwd=source / "client", capture_output=True, text=True)
     assert built.returncode != 0
-    assert "Unfit: esc_client has no sources of its own" in built.stderr
+    assert "esc_client has no sources of its own" in built.stderr

@@ -153,17 +153,3 @@ def test_without_wait_a_search_is_told_and_waited_for_by_its_job(service, esc, n
     done = esc("venue", "find", name, FRAMES[0], "--options", '{"find_lens": true}')
     assert done.returncode == 0
     assert esc("job", "wait", json.loads(done.stdout)["job"]).returncode == 3
-
-
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ("--sport", "quidditch"),
-        ("--sport", "football", "--site", "left.png"),
-        ("--site", "left.png"),
-        ("--options", '{"dry_run": true}'),
-    ],
-)
-def test_a_search_that_cannot_be_asked_of_a_service_is_a_usage_error(esc, arguments):
-    refused = esc("venue", "find", "v", *FRAMES, *arguments)
-    assert (refused.returncode, refused.stdout) == (2, "")

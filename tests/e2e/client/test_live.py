@@ -12,7 +12,6 @@ import pytest
 
 from tests.e2e import warm
 from tests.e2e.client.test_stitching import document
-from tests.e2e.commands import esc_here
 from tests.e2e.program import TURNED
 from tests.e2e.running import venue, wait_for
 from tests.rtsp import encode, filming, has_server
@@ -94,27 +93,6 @@ def test_a_command_whose_output_nobody_reads_any_more_ends_in_silence(arguments)
     # 1 is Typer's own, where printing itself fails.
     assert process.returncode in (0, 1)
     assert [line for line in told.splitlines() if not line.startswith("Sending the poses")] == []
-
-
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (["left=rtsp://10.1.0.7/main", "--hold"], "--hold sends stored poses alone"),
-        (["--recover"], "--recover has the service calibrate a venue of its own whose cameras are tracked"),
-        (["--rate", "0"], "--rate 0: samples a second"),
-        (["--freed", "10.1.0.20"], "--freed 10.1.0.20: expected HOST:PORT"),
-        (["--opentrackio", "10.1.0.20:70000"], "expected HOST:PORT"),
-        (["--zoom", "left=5"], "--zoom and --focus are sent by FreeD alone"),
-        (
-            ["--freed", "10.1.0.20:40000", "--focus", "left=16777216"],
-            "--focus left=16777216: expected a count from 0 to",
-        ),
-    ],
-)
-def test_what_is_no_rate_or_address_is_a_usage_error(service, tmp_path, arguments, said):
-    answer = esc_here(tmp_path, "live", "demo", *arguments, **{"ESC_URL": service.url})
-    assert answer.returncode == 2
-    assert said in answer.stderr
 
 
 @pytest.mark.slow
@@ -202,10 +180,3 @@ def is_measured(state):
 
 def live_state(service, name):
     return service.http.get(f"/venues/{name}/live").json()
-
-
-def test_a_stream_of_a_camera_that_the_venue_has_not_is_a_usage_error(esc, service, name):
-    service.venue(name)
-    answer = esc("live", name, "middle=rtsp://10.1.0.7/main")
-    assert answer.returncode == 2
-    assert "The venue has no camera middle; it has left, right" in answer.stderr

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from service.client import Client, NotUnderstood
-from tests.e2e.commands import esc_process
+from tests.e2e.commands import esc_here
 from tests.e2e.later import later
 from tests.e2e.running import png, venue
 
@@ -45,7 +45,7 @@ def test_every_command_reads_the_answers_of_a_service_that_says_more(service, la
     for side in ("left", "right"):
         (tmp_path / f"{side}.png").write_bytes(png(shade=3))
     for command, code in commands(name):
-        said = esc_process(tmp_path, *command, ESC_URL=later_service)
+        said = esc_here(tmp_path, *command, ESC_URL=later_service)
         assert (said.returncode, "Traceback" in said.stderr) == (code, False), (command, said.stderr)
         assert "added_later" not in said.stdout
 
@@ -57,10 +57,10 @@ def test_words_that_are_new_are_handed_on_as_they_are(service, wordy_service, tm
         assert client.venue(name).lens == "breathing"
         assert client.job(job["id"]).result.verdict == "hazy"
         assert {revision.cause for revision in client.history(name)} == {"foreseen"}
-    said = esc_process(tmp_path, "venue", "get", name, ESC_URL=wordy_service)
+    said = esc_here(tmp_path, "venue", "get", name, ESC_URL=wordy_service)
     assert (said.returncode, said.stderr) == (0, "")
     assert json.loads(said.stdout)["lens"] == "breathing"
-    said = esc_process(tmp_path, "job", "list", "--venue", name, ESC_URL=wordy_service)
+    said = esc_here(tmp_path, "job", "list", "--venue", name, ESC_URL=wordy_service)
     assert (said.returncode, said.stderr) == (0, "")
     assert "parked" in said.stdout
 
@@ -76,7 +76,7 @@ def test_an_answer_that_is_none_of_escs_is_a_line_and_no_traceback(service, tmp_
     service.venue(name)
     with later(service, {}) as server:
         server.more = lambda value: {"cameras": 7}
-        said = esc_process(tmp_path, "venue", "get", name, ESC_URL=server.url)
+        said = esc_here(tmp_path, "venue", "get", name, ESC_URL=server.url)
         assert (said.returncode, said.stdout, "Traceback" in said.stderr) == (1, "", False)
         assert "is not understood" in said.stderr
         with Client(server.url) as client, pytest.raises(NotUnderstood):

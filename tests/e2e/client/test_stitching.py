@@ -102,37 +102,17 @@ def test_the_light_that_a_venue_keeps_is_used(esc, name, clips, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "code", "words"),
+    ("arguments", "words"),
     [
-        (("left=l.mp4", "left=l.mp4"), 2, "camera left is given twice"),
-        (("l.mp4",), 2, "'l.mp4' is not CAMERA=CLIP"),
-        (("left=l.mp4", "--width", "321"), 2, "are even numbers"),
-        (("left=l.mp4", "--height", "99"), 2, "are even numbers"),
-        (("left=l.mp4", "--height", "high"), 2, "--height: 'high' is no number"),
-        (("left=l.mp4", "--field-of-view", "400"), 2, "--field-of-view 400: from 5 to 340, or auto"),
-        (
-            ("left=l.mp4", "--projection", "fisheye"),
-            2,
-            "Invalid value for '--projection'",
-        ),
-        (("left=l.mp4", "--rate", "0"), 2, "--rate 0: pictures a second"),
-        (("left=l.mp4", "--from", "1:xx"), 2, "'xx' is no number"),
-        (("left=l.mp4", "--offset", "right=soon"), 2, "--offset right=soon: 'soon' is no number"),
-        (("left=l.mp4",), 1, "No clip of camera right. --allow-missing"),
-        (("left=l.mp4", "middle=m.mp4"), 1, "clip: the venue has no camera middle; it has left, right"),
-        (("left=l.mp4", "right=r.mp4"), 1, "camera left: there is no file l.mp4"),
+        (("left=l.mp4",), "No clip of camera right. --allow-missing"),
+        (("left=l.mp4", "middle=m.mp4"), "clip: the venue has no camera middle; it has left, right"),
+        (("left=l.mp4", "right=r.mp4"), "camera left: there is no file l.mp4"),
     ],
 )
-def test_what_is_wrong_is_said(esc, venue_file, arguments, code, words):
+def test_clips_that_cannot_be_stitched_are_named(esc, venue_file, arguments, words):
     answer = esc("stitch", venue_file, *arguments, "-o", "pano.mp4")
-    assert answer.returncode == code
+    assert answer.returncode == 1
     assert words in answer.stderr
-
-
-def test_a_venue_that_is_neither_file_nor_id_is_named(esc):
-    answer = esc("stitch", "Venue.json", "left=l.mp4", "-o", "pano.mp4")
-    assert answer.returncode == 2
-    assert "There is no file Venue.json" in answer.stderr
 
 
 def test_without_pyav_it_says_how_to_get_it(esc, venue_file, clips, monkeypatch):

@@ -1,0 +1,35 @@
+"""The progress bar of a command that waits for a calibration, here or in a service."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+from service.client import Client
+from service.schemas.job import Job
+
+
+def follow_to_end(client: Client, job: Job) -> Job:
+    """Wait for the end of a job, with a progress bar, and return the job."""
+    with progress_bar() as show:
+
+        def show_job(job: Job) -> None:
+            if job.progress is not None:
+                show(job.progress.stage, job.progress.fraction)
+            else:
+                show(f"queued, {job.queue_position}." if job.queue_position else "starting", 0.0)
+
+        return client.follow(job, show_job)
+
+
+@contextmanager
+def progress_bar() -> Iterator[Callable[[str, float], None]]:
+    """Show a progress bar on a terminal; yields what takes the name of the stage and the fraction that is done."""
+    console = Console(stderr=True, soft_wrap=True, highlight=False, markup=False)
+    columns = (TextColumn("{task.description:<14}"), BarColumn(), TextColumn("{task.percentage:3.0f} %"))
+    with Progress(*columns, TimeElapsedColumn(), console=console, disable=not console.is_terminal) as bar:
+        line = bar.add_task("waiting", total=1.0)
+        yield lambda stage, fraction: bar.update(line, completed=fraction, description=stage)

@@ -1,0 +1,75 @@
+"""`esc run`: the calibration of a venue's file, without a service."""
+
+from __future__ import annotations
+
+import secrets
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from service.cli.answers import print_answer, write_pictures
+from service.cli.arguments import AnswerAsJson, Frames, OptionsText, parse_document, parse_options
+from service.cli.local_engine import checked_files, engine_progress, engine_settings
+from service.cli.printing import ACCEPTED, REJECTED, print_note
+from service.schemas.results import Result
+from service.schemas.venue import VenueIn
+
+
+def run(
+    venue: Annotated[
+        Path,
+        typer.Argument(
+            metavar="VENUE.json", exists=True, dir_okay=False, help="File of a venue, as `esc venue get` prints it."
+        ),
+    ],
+    frames: Frames,
+    output: Annotated[
+        Path, typer.Option("-o", "--output", file_okay=False, help="Folder for result.json and the pictures.")
+    ],
+    options: OptionsText = "{}",
+    debug: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR",
+            help="Folder for what each stage saw, as pictures and JSON; its index.json says what is what.",
+        ),
+    ] = None,
+    as_json: AnswerAsJson = False,
+) -> None:
+    """Calibrate a venue's file by frames, without a service. Exit codes as of `calibrate`."""
+    settings, job_options = engine_settings(), parse_options(options)
+    if job_options.callback_url is not None:
+        print_note("callback_url is not used: without a service nobody is told. The exit code says how it went.")
+    from worker.calibration.records import NOT_RECORDED
+    from worker.compute_resources import ComputeResources
+    from worker.jobs import calibration, inputs
+    from worker.jobs.debugging import DebugRecorder
+
+    stored = parse_document(VenueIn, venue.read_bytes(), str(venue)).to_venue()
+    if job_options.seed is None:
+        job_options = job_options.model_copy(update={"seed": secrets.randbelow(2**31)})
+    job_options = job_options.model_copy(update={"pictures": True})
+    files = checked_files(stored, frames, settings)
+    resources, recorder = ComputeResources.of(settings), NOT_RECORDED if debug is None else DebugRecorder()
+    try:
+        with engine_progress() as show:
+            solution = calibration.solve(
+                inputs.read_record(inputs.Venue, stored.model_dump(mode="json")),
+                files,
+                inputs.read_record(inputs.Options, job_options.model_dump(mode="json")),
+                resources,
+                show,
+                recorder=recorder,
+            )
+    finally:
+        # The records of the stages before a failure show its cause.
+        if debug is not None and isinstance(recorder, DebugRecorder):
+            debug.mkdir(parents=True, exist_ok=True)
+            for name, data in recorder.files.items():
+                (debug / name).write_bytes(data)
+    write_pictures(output, solution.pictures)
+    result = Result.model_validate(solution.result)
+    (output / "result.json").write_text(result.model_dump_json(indent=2) + "\n")
+    print_answer(result, as_json=as_json)
+    raise typer.Exit(ACCEPTED if result.accepted else REJECTED)

@@ -1,0 +1,37 @@
+"""`esc worker`: what computes the jobs of a service."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from service import confinement
+from service.cli.arguments import Data
+from service.cli.local_database import report_database_errors, require_folders, require_local_database
+from service.cli.printing import USAGE, fail
+from service.cli.service_settings import load_settings
+from service.worker_lock import AlreadyRunning
+from worker import supervisor
+
+
+def worker(
+    data: Data = None,
+    name: Annotated[
+        str | None,
+        typer.Option(
+            "--name",
+            help="A name that no other worker has, the same after a restart (ESC_WORKER_NAME) [default: the host's]",
+        ),
+    ] = None,
+) -> None:
+    """Run a worker alone: it computes the jobs of a service whose database and files its settings name."""
+    confinement.hide_memory()
+    settings = load_settings(data=data, worker_name=name)
+    try:
+        with report_database_errors(settings):
+            require_local_database(settings)
+            require_folders(settings, with_worker=True)
+            supervisor.run(settings)
+    except AlreadyRunning as error:
+        fail(str(error), USAGE)
