@@ -112,9 +112,8 @@ def run(
     from service.store.jobs.files import picture_file
     from worker.calibration.records import NOT_RECORDED
     from worker.compute_resources import ComputeResources
-    from worker.jobs import calibration, inputs
+    from worker.jobs import calibration
     from worker.jobs.debugging import DebugRecorder
-    from worker.jobs.inputs import read_record
 
     stored = parse_document(VenueIn, venue.read_bytes(), str(venue)).to_venue()
     if chosen.seed is None:
@@ -125,11 +124,11 @@ def run(
     try:
         with report_job_failures(), progress_bar() as show:
             solution = calibration.solve(
-                read_record(inputs.Venue, stored.model_dump(mode="json")),
+                stored,
                 files,
-                read_record(inputs.Options, chosen.model_dump(mode="json")),
+                chosen,
                 resources,
-                lambda step: show(step["stage"], step["fraction"]),
+                lambda step: show(step.stage, step.fraction),
                 recorder=recorder,
             )
     finally:

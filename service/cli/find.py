@@ -58,7 +58,7 @@ def find(
 
     resources = ComputeResources.of(settings)
     with report_job_failures(), progress_bar() as show:
-        solution = finding.solve(place, files, seed, resources, lambda step: show(step["stage"], step["fraction"]))
+        solution = finding.solve(place, files, seed, resources, lambda step: show(step.stage, step.fraction))
     if pictures is not None:
         pictures.mkdir(parents=True, exist_ok=True)
         for name, picture in solution.pictures.items():

@@ -111,7 +111,7 @@ def intrinsics(
     with report_job_failures(), progress_bar() as show:
         for name, data in files.items():
             image_checks.check_photo(name, data, settings)
-        solution = intrinsics.solve(files, options, lambda step: show(step["stage"], step["fraction"]))
+        solution = intrinsics.solve(files, options, lambda step: show(step.stage, step.fraction))
     output.write_text(solution.result.model_dump_json(indent=2) + "\n")
     if picture is not None:
         picture.write_bytes(solution.pictures["coverage"])
@@ -269,7 +269,7 @@ def _fit_locally(file: Path, frames: list[str], options: FieldOptions) -> tuple[
     files = checked_files(stored, frames, settings)
     with report_job_failures(), progress_bar() as show:
         solution = field.solve(
-            stored, files, options, ComputeResources.of(settings), lambda step: show(step["stage"], step["fraction"])
+            stored, files, options, ComputeResources.of(settings), lambda step: show(step.stage, step.fraction)
         )
     return stored, solution.result, solution.pictures
 

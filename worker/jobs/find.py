@@ -31,8 +31,8 @@ from worker.calibration.relocalisation.sought import (
 )
 from worker.calibration.rendering.overlays import candidate_picture
 from worker.compute_resources import ComputeResources
-from worker.jobs.answers import Progress, Provenance
 from worker.jobs.decoding import decode_frame, decode_frame_of_any_size
+from worker.jobs.documents import Progress, Provenance
 from worker.jobs.from_schemas import (
     Picture,
     camera_of,

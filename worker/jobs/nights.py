@@ -23,7 +23,7 @@ from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.lens import SIGMA_NAMES
 from worker.calibration.memory.camera_memory import CameraMemory
 from worker.calibration.refinement import uncertainty
-from worker.jobs.answers import LensChange, Refined
+from worker.jobs.documents import LensChange, Refined
 from worker.jobs.to_schemas import lens_to_schema, pose_to_schema, sigma_to_schema
 
 
@@ -42,7 +42,7 @@ def refined_to_schema(pitch: Field, found: CameraResult) -> Refined | None:
     covariance = refined.covariance if np.isfinite(refined.covariance).all() else None
     return Refined(
         pose=pose_to_schema(refined.camera.pose),
-        intrinsics={**lens_to_schema(refined.camera.intrinsics), "sigma": _lens_sigma(covariance)},
+        intrinsics=lens_to_schema(refined.camera.intrinsics).model_copy(update={"sigma": _lens_sigma(covariance)}),
         covariance=None if covariance is None else covariance.tolist(),
         sigma=sigma_to_schema(refined.sigma),
         longer=focal_refined / focal - 1,

@@ -18,20 +18,21 @@ import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any, cast
 
 import cv2
 import numpy as np
 
 from service import child_process
 from worker.compute_resources import ComputeResources
-from worker.jobs.answers import Progress
+from worker.jobs.documents import Document, Progress, parse, parse_task
 from worker.jobs.from_schemas import JobFailedError
 from worker.jobs.to_schemas import Solution
 
 if TYPE_CHECKING:
     from service.schemas.find import SoughtSite
-    from service.schemas.options import FindOptions
+    from service.schemas.options import FindOptions, Options
+    from service.schemas.venue import Venue
     from service.store.jobs.task import Task
 
 BEHIND_THE_OTHERS = 10
@@ -61,7 +62,7 @@ def main() -> None:
         parent.told({"error": _without_memory().error})
         return
     last = {
-        "result": _document(solution.result),
+        "result": solution.result.model_dump(mode="json"),
         "pictures": {name: len(picture) for name, picture in solution.pictures.items()},
         "later": list(solution.later),
         "memories": dict(solution.memories),
@@ -83,14 +84,14 @@ def _without_memory() -> JobFailedError:
     return JobFailedError("job-crashed", detail)
 
 
-def read_request(stream: IO[bytes]) -> tuple[dict[str, Any], dict[str, list[bytes]]]:
-    """Read a request that `JobRequest.write` wrote, as JSON, and its files."""
-    request = json.loads(stream.readline())
+def read_request(stream: IO[bytes]) -> tuple[Document, dict[str, list[bytes]]]:
+    """Read a request that `JobRequest.write` wrote, as a document, and its files."""
+    request = parse(stream.readline())
     return request, {name: [stream.read(size) for size in several] for name, several in request["sizes"].items()}
 
 
 def _compute(
-    task: dict[str, Any],
+    task: Document,
     files: Mapping[str, Sequence[bytes]],
     means: ComputeResources,
     report: Callable[[Progress], None],
@@ -99,15 +100,15 @@ def _compute(
     cv2.setNumThreads(means.threads)
     if task["kind"] != "calibration":
         return _compute_by_models(task, files, means, report)
-    from worker.jobs import calibration, inputs
+    from worker.jobs import calibration
 
-    given = inputs.read_record(inputs.Task, task)
+    given = parse_task(task)
     nights = calibration.NightHistory(given.last_views, given.memories, given.anchors, given.taken_at)
-    return calibration.solve(given.venue, files, given.options, means, report, nights)
+    return calibration.solve(cast("Venue", given.venue), files, cast("Options", given.options), means, report, nights)
 
 
 def _compute_by_models(
-    document: dict[str, Any],
+    document: Document,
     files: Mapping[str, Sequence[bytes]],
     means: ComputeResources,
     report: Callable[[Progress], None],
@@ -149,12 +150,6 @@ def _site_of(task: Task, options: FindOptions, files: Mapping[str, Sequence[byte
         return task.site
     assert task.venue is not None
     return SoughtSite.of(task.venue, options, files)
-
-
-def _document(result: Any) -> dict[str, Any]:
-    """A result as JSON has it, which is a model of the wire unless it is plain already."""
-    document: dict[str, Any] = result if isinstance(result, dict) else result.model_dump(mode="json")
-    return document
 
 
 def encode(message: Mapping[str, Any]) -> bytes:

@@ -25,11 +25,12 @@ from worker.calibration.geometry.lens import Lens
 from worker.calibration.refinement import cross_check, uncertainty
 from worker.calibration.stitching.photometry import Light
 from worker.compute_resources import ComputeResources
-from worker.jobs import answers
-from worker.jobs.answers import (
+from worker.jobs import documents
+from worker.jobs.documents import (
     CameraResult,
     CrossCheck,
     Displacement,
+    Intrinsics,
     MarkingResult,
     Moved,
     PairResult,
@@ -43,8 +44,7 @@ from worker.jobs.answers import (
 from worker.jobs.from_schemas import JobFailedError, camera_of
 
 if TYPE_CHECKING:
-    from service.schemas import trend
-    from worker.jobs import inputs
+    from service.schemas.trend import Anchor
 
 PROVIDERS = {"cpu": "CPUExecutionProvider", "cuda": "CUDAExecutionProvider", "openvino": "OpenVINOExecutionProvider"}
 # The engine's report ends with the refinement; what is left is drawing.
@@ -70,7 +70,7 @@ class Solution(Generic[R]):
 
 def provenance_of(means: ComputeResources, segmenter: Segmenter, seed: int, options: dict[str, Any]) -> Provenance:
     """What computes a solution by these options, so that it can be computed again."""
-    return {"software": means.software, "model_sha256": segmenter.sha256, "seed": seed, "options": options}
+    return Provenance(software=means.software, model_sha256=segmenter.sha256, seed=seed, options=options)
 
 
 def round_to_ms(timings_s: Mapping[str, float]) -> dict[str, float]:
@@ -78,13 +78,13 @@ def round_to_ms(timings_s: Mapping[str, float]) -> dict[str, float]:
     return {stage: round(seconds, 3) for stage, seconds in timings_s.items()}
 
 
-def lens_to_schema(lens: Lens) -> answers.Intrinsics:
+def lens_to_schema(lens: Lens) -> Intrinsics:
     """A lens of the engine for the wire."""
     # What photos or clicks hardly tell has a deviation beyond any number that says something.
     sigma = {
         name: min(max(value, LEAST_SIGMA), LARGEST_SIGMA) for name, value in lens.sigma.items() if not isnan(value)
     }
-    return answers.Intrinsics(
+    return Intrinsics(
         model=lens.model,
         matrix=lens.matrix.tolist(),
         distortion=lens.distortion.tolist(),
@@ -93,16 +93,16 @@ def lens_to_schema(lens: Lens) -> answers.Intrinsics:
     )
 
 
-def light_to_schema(light: Light) -> answers.Light:
+def light_to_schema(light: Light) -> documents.Light:
     """How a camera's picture is evened out, for the wire: colours from red to blue."""
-    return answers.Light(
+    return documents.Light(
         gain=[*reversed(light.gain)], contrast=light.contrast, falloff=light.falloff, reach=light.reach
     )
 
 
-def pose_to_schema(pose: Pose) -> answers.Pose:
+def pose_to_schema(pose: Pose) -> documents.Pose:
     """A pose of the engine for the wire."""
-    return answers.Pose(
+    return documents.Pose(
         rotation=pose.rotation.tolist(), position=pose.position.tolist(), translation=pose.translation.tolist()
     )
 
@@ -139,31 +139,27 @@ def engine_failures() -> Iterator[None]:
 
 def progress_to_schema(step: records.Progress) -> Progress:
     """How far the engine is, with room for the pictures."""
-    progress = Progress(
+    return Progress(
         stage=step.stage,
         fraction=min(max(step.fraction, 0.0), PREVIEW_FRACTION),
         generation=step.generation,
         loss=finite_or_none(step.loss),
+        expected_end=None if step.remaining_s is None else _moment_in(step.remaining_s),
     )
-    if step.remaining_s is not None:
-        progress["expected_end"] = (datetime.now(UTC) + timedelta(seconds=step.remaining_s)).isoformat()
-    return progress
 
 
-def camera_to_schema(
-    found: quality.CameraResult,
-    lens: answers.Intrinsics | None = None,
-    light: answers.Light | None = None,
-    moved_from_anchor: Displacement | None = None,
-) -> CameraResult:
-    """What a finish has to say of a camera; `lens` and `light` where they were found as well."""
+def _moment_in(seconds: float) -> str:
+    return (datetime.now(UTC) + timedelta(seconds=seconds)).isoformat()
+
+
+def camera_to_schema(found: quality.CameraResult) -> CameraResult:
+    """Return the result of a camera by its refinement alone, without what calibrations add from lights and memories."""
     return CameraResult(
         id=found.camera.id,
         accepted=found.accepted,
         rejected_because=found.rejected_because,
         refusal=None if found.refusal is None else refusal_uri(found.refusal.reason),
         pose=pose_to_schema(found.camera.pose),
-        intrinsics=lens,
         sigma=sigma_to_schema(found.sigma),
         repeatability=sigma_to_schema(found.repeatability),
         moved=_moved(found.moved),
@@ -174,15 +170,9 @@ def camera_to_schema(
         by_chance=finite_or_none(found.evidence.by_chance),
         view=_view(found.view),
         residual_px=finite_or_none(found.residual_px),
-        light=light,
-        refined=None,
-        lens_change=None,
-        nights=0,
-        seen_by_network=None,
         markings=[_marking(one) for one in found.markings],
         knocked=found.knocked,
         proposed=_proposal(found) if _is_proposed(found) else None,
-        displacement=moved_from_anchor,
         cross_check=_cross_check(found.cross_checked()),
     )
 
@@ -204,9 +194,7 @@ def _proposal(found: quality.CameraResult) -> Proposal:
     )
 
 
-def displacement_to_schema(
-    pitch: Field, found: quality.CameraResult, anchor: trend.Anchor | inputs.Anchor | None
-) -> Displacement | None:
+def displacement_to_schema(pitch: Field, found: quality.CameraResult, anchor: Anchor | None) -> Displacement | None:
     """How far a camera is from its anchor; one that has none yet is its own. None where that cannot be told."""
     begun = found.camera if anchor is None else camera_of(anchor.posed)
     moved = measure_displacement(pitch, begun, found)
