@@ -123,7 +123,7 @@ class Worker:
         beaten, judging_from = time.monotonic(), 0.0
         while not stop.wait(BEAT_S):
             try:
-                # Of that moment: the threads of jobs add to it.
+                # A copy: the threads of jobs add to it.
                 unreadable = set(self._unreadable)
                 heard = self._heartbeat.beat_and_listen(unreadable)
                 if heard is None:
@@ -314,13 +314,13 @@ def _retry_until(write: Callable[[], Answer], until: float) -> Answer:
 
 
 def _run_duty(poll: Callable[[], float], stop: threading.Event) -> None:
-    """Call `poll` until `stop` is set; it returns the seconds until its next call. Errors put the call off."""
+    """Call `poll` until `stop` is set; it returns the seconds until its next call. Retry after errors."""
     pause_s = 0.0
     while not stop.wait(pause_s):
         try:
             pause_s = poll()
         except Exception:  # the database or the store is away: the next call tries again
-            log.warning("put off", duty=poll.__qualname__, exc_info=True)
+            log.warning("duty failed, it is tried again", duty=poll.__qualname__, exc_info=True)
             pause_s = DUTY_RETRY_S
 
 

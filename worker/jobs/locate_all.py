@@ -76,7 +76,7 @@ def _compared(
 
 
 def _misfit(end: Solution[LocateResult] | JobFailedError) -> str | None:
-    """How badly points and lens of a camera fit each other, in words; None where nothing speaks against them."""
+    """Return in words how badly points and lens of a camera fit each other, or None if they fit."""
     if isinstance(end, JobFailedError):
         return "no pose" if end.kind == "no-pose" else None
     result = end.result
@@ -89,7 +89,7 @@ def _misfit(end: Solution[LocateResult] | JobFailedError) -> str | None:
 
 
 def _rms_px(field: FieldOfPlay, camera: str, points: Mapping[str, list[ClickedPoint]], lens: Lens) -> float | None:
-    """How well a camera's points fit a lens as it is; None where they do not."""
+    """Return the rms of a camera's points with a lens as it is, or None if they do not fit it."""
     pitch = pitch_of(field)
     try:
         found = first_pose(clicks_of(camera, pitch, points[camera]), lens, pitch.places(), camera)

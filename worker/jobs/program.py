@@ -71,7 +71,7 @@ def main() -> None:
 
 
 def _is_lack_of_memory(error: Exception) -> bool:
-    """Whether something failed since no memory was left: NumPy, OpenCV and ONNX Runtime each say it in their way."""
+    """Return True for the errors by which NumPy, OpenCV and ONNX Runtime say that no memory was left."""
     if isinstance(error, MemoryError) or (isinstance(error, cv2.error) and error.code == cv2.Error.StsNoMem):
         return True
     return "bad_alloc" in str(error) or "allocate memory" in str(error)
@@ -96,7 +96,7 @@ def _compute(
     means: ComputeResources,
     report: Callable[[Progress], None],
 ) -> Solution[Any]:
-    """What the kind of the job asks for; what other kinds need is not loaded."""
+    """Compute a job by its kind; modules of the other kinds are not loaded."""
     cv2.setNumThreads(means.threads)
     if task["kind"] != "calibration":
         return _compute_by_models(task, files, means, report)
@@ -143,7 +143,7 @@ def _compute_by_models(
 
 
 def _site_of(task: Task, options: FindOptions, files: Mapping[str, Sequence[bytes]]) -> SoughtSite:
-    """The site whose cameras are to be found: the one that was sent, or the stored venue."""
+    """Return the site whose cameras are to be found: the one that was sent, or the stored venue."""
     from service.schemas.find import SoughtSite
 
     if task.site is not None:
@@ -158,7 +158,7 @@ def encode(message: Mapping[str, Any]) -> bytes:
 
 
 def _plain(value: Any) -> Any:
-    """A value without NumPy's scalars, and without what JSON has no numbers for."""
+    """Return a value with plain numbers for NumPy's, and None for numbers that JSON lacks."""
     match value:
         case dict():
             return {name: _plain(one) for name, one in value.items()}
@@ -184,13 +184,13 @@ class Parent(logging.Handler):
         os.dup2(2, 1)
 
     def told(self, message: Mapping[str, Any], *files: bytes) -> None:
-        """Say it, the members of a `worker.protocol.Message`, and hand over the files behind it."""
+        """Write a `worker.protocol.Message` as a line of JSON, and the files behind it."""
         self._messages.write(encode(message) + b"\n")
         self._messages.writelines(files)
         self._messages.flush()
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Say a line of the log, which the parent knows the job of."""
+        """Send a line of the log to the parent, which adds the job."""
         self.told({"warning": self.format(record)})
 
 

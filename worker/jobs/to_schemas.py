@@ -1,4 +1,4 @@
-"""What the kinds of jobs share: what they compute with, how they end, how the engine's answer becomes the wire's."""
+"""Conversion of the engine's answers to documents of the wire, and other parts that the kinds of jobs share."""
 
 from __future__ import annotations
 
@@ -56,10 +56,10 @@ R = TypeVar("R", covariant=True)
 
 @dataclass(frozen=True)
 class Solution(Generic[R]):
-    """A result and the files of its pictures, by the names that `service.store.jobs.files.picture_file` knows.
+    """A result and the files of its pictures by the names that `service.store.jobs.files.picture_file` knows.
 
-    That of a calibration is a plain record, those of other kinds are models of the wire.
-    `later`: the names of those that can be drawn when somebody looks; `memories`: of the accepted cameras, by camera.
+    The result of a calibration is a document, those of other kinds are models of the wire.
+    `later`: names of pictures that can be drawn when somebody looks; `memories`: of the accepted cameras, by camera.
     """
 
     result: R
@@ -69,17 +69,17 @@ class Solution(Generic[R]):
 
 
 def provenance_of(means: ComputeResources, segmenter: Segmenter, seed: int, options: dict[str, Any]) -> Provenance:
-    """What computes a solution by these options, so that it can be computed again."""
+    """Return software, model, seed and options, by which a result can be computed again."""
     return Provenance(software=means.software, model_sha256=segmenter.sha256, seed=seed, options=options)
 
 
 def round_to_ms(timings_s: Mapping[str, float]) -> dict[str, float]:
-    """The seconds of each stage, as a result shows them."""
+    """Return the seconds of each stage, rounded to milliseconds."""
     return {stage: round(seconds, 3) for stage, seconds in timings_s.items()}
 
 
 def lens_to_schema(lens: Lens) -> Intrinsics:
-    """A lens of the engine for the wire."""
+    """Return a lens of the engine for the wire."""
     # What photos or clicks hardly tell has a deviation beyond any number that says something.
     sigma = {
         name: min(max(value, LEAST_SIGMA), LARGEST_SIGMA) for name, value in lens.sigma.items() if not isnan(value)
@@ -94,31 +94,31 @@ def lens_to_schema(lens: Lens) -> Intrinsics:
 
 
 def light_to_schema(light: Light) -> documents.Light:
-    """How a camera's picture is evened out, for the wire: colours from red to blue."""
+    """Return a camera's photometric correction for the wire, its colours from red to blue."""
     return documents.Light(
         gain=[*reversed(light.gain)], contrast=light.contrast, falloff=light.falloff, reach=light.reach
     )
 
 
 def pose_to_schema(pose: Pose) -> documents.Pose:
-    """A pose of the engine for the wire."""
+    """Return a pose of the engine for the wire."""
     return documents.Pose(
         rotation=pose.rotation.tolist(), position=pose.position.tolist(), translation=pose.translation.tolist()
     )
 
 
 def ridge_to_schema(pitch: Field) -> list[list[float]] | None:
-    """The two ends of a pitch's ridge for the wire, in millimetres; None of a flat one."""
+    """Return the two ends of a pitch's ridge (m, to the millimetre), or None for a flat one."""
     return None if pitch.ridge is None else pitch.ridge.round(MILLIMETRE).tolist()
 
 
 def finite_or_none(value: Any) -> float | None:
-    """JSON has no NaN and no infinity."""
+    """Return a number, or None for NaN and infinity, which JSON lacks."""
     return float(value) if value is not None and isfinite(value) else None
 
 
 def load_segmenter(means: ComputeResources) -> Segmenter:
-    """The network that the settings name, which is loaded when it is first asked."""
+    """Return the network that the settings name; it is loaded at its first use."""
     if not means.model.is_file():
         raise JobFailedError("model-missing", f"{means.model} is not there; set ESC_MODEL or train one.")
     return Segmenter(means.model, means.threads, PROVIDERS[means.provider])
@@ -126,7 +126,7 @@ def load_segmenter(means: ComputeResources) -> Segmenter:
 
 @contextmanager
 def engine_failures() -> Iterator[None]:
-    """Say of what the engine cannot compute why the job has no result; raises `JobFailedError`."""
+    """Raise `JobFailedError` for errors of the engine that explain why the job has no result."""
     try:
         yield
     except records.CalibrationError as error:
@@ -138,7 +138,7 @@ def engine_failures() -> Iterator[None]:
 
 
 def progress_to_schema(step: records.Progress) -> Progress:
-    """How far the engine is, with room for the pictures."""
+    """Return the engine's progress for the wire, with room left for the pictures."""
     return Progress(
         stage=step.stage,
         fraction=min(max(step.fraction, 0.0), PREVIEW_FRACTION),
@@ -195,7 +195,7 @@ def _proposal(found: quality.CameraResult) -> Proposal:
 
 
 def displacement_to_schema(pitch: Field, found: quality.CameraResult, anchor: Anchor | None) -> Displacement | None:
-    """How far a camera is from its anchor; one that has none yet is its own. None where that cannot be told."""
+    """Return the displacement of a camera from its anchor, or from itself without one; None if it is unknown."""
     begun = found.camera if anchor is None else camera_of(anchor.posed)
     moved = measure_displacement(pitch, begun, found)
     if moved is None:
@@ -235,7 +235,7 @@ def _marking(seen: MarkingReport) -> MarkingResult:
 
 
 def pair_to_schema(pair: Pair, found: seam.Seam) -> PairResult:
-    """What two cameras say of each other."""
+    """Return the comparison of two cameras for the wire."""
     return PairResult(
         cameras=list(pair.cameras),
         stitch_error_px=finite_or_none(pair.error_px),
@@ -254,7 +254,7 @@ def _place(place: seam.SeamPlace) -> SeamPlace:
 
 
 def _rounded_cm(metres: float | None) -> float | None:
-    """To the millimetre."""
+    """Return a length in centimetres, rounded to the millimetre."""
     return None if metres is None or not isfinite(metres) else round(100 * metres, 1)
 
 
@@ -270,7 +270,7 @@ def _view(found: ViewCondition) -> View:
 
 
 def sigma_to_schema(sigma: uncertainty.Sigma | None) -> Sigma | None:
-    """A standard deviation of the engine for the wire; None where a pose is not determined."""
+    """Return a standard deviation of the engine for the wire, or None if the pose is not determined."""
     if sigma is None or not isfinite(sigma.rotation_deg) or not isfinite(sigma.position_m):
         return None
     return Sigma(rotation_deg=sigma.rotation_deg, position_m=sigma.position_m)

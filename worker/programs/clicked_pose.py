@@ -20,7 +20,7 @@ from worker.jobs.locate import clicks_of, pose_of, result_of
 
 # A line is drawn as far as this beside the picture, in widths of it: what is further out is not worth drawing.
 BESIDE = 0.25
-# Of the points of a marking, which are a quarter of a metre apart.
+# Every so many-th point of a marking is drawn; they are a quarter of a metre apart.
 EVERY = 3
 
 
@@ -32,7 +32,7 @@ def main() -> None:
 
 
 def answer(asked: ClickedPoseRequest) -> ClickedPose:
-    """The pose, the field as it has it, and where it expects each point; or why there is none."""
+    """Return the pose, the lines of the field and the expected clicks by it, or why there is none."""
     begun = time.perf_counter()
     pitch = pitch_of(asked.field)
     try:
@@ -46,7 +46,7 @@ def answer(asked: ClickedPoseRequest) -> ClickedPose:
 
 
 def _lines(pitch: Field, camera: Camera) -> list[Polyline]:
-    """Each marking in pixels, broken where the camera does not see it."""
+    """Return each marking in pixels, broken where the camera does not see it."""
     lines: list[Polyline] = []
     width, _ = camera.intrinsics.size
     for marking in pitch.markings():

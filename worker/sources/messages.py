@@ -30,7 +30,7 @@ class Message:
 
     @property
     def is_response(self) -> bool:
-        """Whether it is a response."""
+        """True for a response, False for a request."""
         return self.first.startswith("RTSP/")
 
     @property
@@ -67,7 +67,7 @@ class Message:
         return replace(self, headers=(*others, (name, value)))
 
     def encoded(self) -> bytes:
-        """As it is sent."""
+        """Return the bytes of the message."""
         lines = [self.first, *(f"{name}: {value}" for name, value in self.headers), "", ""]
         return "\r\n".join(lines).encode("utf-8", "surrogateescape") + self.body
 

@@ -42,7 +42,7 @@ FACTORED = ("libx264", "libx265")
 
 @dataclass(frozen=True)
 class Encoding:
-    """How pictures are coded: any video encoder of libav; `crf` and `preset` are for those that have them."""
+    """Choice of a video encoder of libav; `crf` and `preset` are for those that have them."""
 
     codec: str = "libx264"
     crf: int = 20
@@ -50,7 +50,7 @@ class Encoding:
 
     @property
     def options(self) -> dict[str, str]:
-        """As the encoder takes them."""
+        """Options of the encoder."""
         return {"crf": str(self.crf), "preset": self.preset} if self.codec in FACTORED else {}
 
 
@@ -186,7 +186,7 @@ class Writer:
         raise VideoError(f"{without_login(self._address)} cannot be written: {said}{left}.{hint}") from self._error
 
     def _sent(self) -> int:
-        """How the sender ended."""
+        """Wait for the sender to end; return its exit code."""
         if self._sender is None or self._sender.stdin is None:
             return 0
         with suppress(OSError):

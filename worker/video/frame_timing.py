@@ -1,4 +1,4 @@
-"""Which picture of each clip stands for a moment: the nearest one, read ahead by a thread of its own."""
+"""Choice of the picture of each clip nearest to a moment; pictures are read ahead by a thread."""
 
 from __future__ import annotations
 
@@ -85,11 +85,11 @@ class ClipTrack:
 
     @property
     def begin_s(self) -> float:
-        """When the clip begins, in the time of all; a live stream begins when it arrives."""
+        """Beginning of the clip in the time of all (s); a live stream begins when it arrives."""
         return self.offset_s + (self._now.time_s if self.live and self._now is not None else 0.0)
 
     def at(self, time_s: float) -> ClipPicture | None:
-        """The nearest picture, None once the clip has ended; `VideoError` where too many were broken."""
+        """Return the nearest picture, None once the clip has ended; raises `VideoError` if too many were broken."""
         own = time_s - self.offset_s
         while self._next is not None and self._now is not None and self._next.time_s - own <= own - self._now.time_s:
             self._now = self._next

@@ -53,7 +53,7 @@ def main() -> None:
 
 
 def stitched(asked: StitchRequest) -> Panorama:
-    """How frames become the view that was chosen."""
+    """Return the panorama of the chosen view."""
     pitch, cameras = pitch_of(asked.field), [camera_of(camera) for camera in asked.cameras]
     view = chosen_view(pitch, cameras, choice_of(asked.view))
     width, height = view.size
@@ -64,7 +64,7 @@ def stitched(asked: StitchRequest) -> Panorama:
 
 
 def picture(asked: StitchRequest, made: Panorama, files: Mapping[str, bytes]) -> Picture:
-    """What the view makes of frames. Somebody waits for it: they are read no larger than it shows them."""
+    """Draw the view of frames, which are read no larger than it shows them, since somebody waits for it."""
     with ThreadPoolExecutor(asked.threads) as each:
         read = [*each.map(lambda part: _read(part, files[part.camera]), made.parts)]
     smaller = replace(made, parts=[part for part, _ in read])
