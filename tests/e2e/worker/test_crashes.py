@@ -2,13 +2,11 @@
 
 import os
 import signal
-import socket
 import time
 
 from service.serving import GRACE_S
 from tests.disks import filled
 from tests.e2e.books import settle
-from tests.e2e.commands import esc_process
 from tests.e2e.killing import (
     chance,
     kill_api,
@@ -100,16 +98,11 @@ def test_a_submission_killed_at_any_moment_is_one_job_or_none(start):
     settle(service)
 
 
-def test_two_workers_of_one_name_do_not_run_on_one_machine(service):
-    second = esc_process(service.data, "worker", "--name", socket.gethostname(), **service.environment)
-    assert second.returncode == 2
-    assert "already runs" in second.stderr
-
-
 def test_a_killed_service_leaves_no_process_and_goes_on_when_it_is_back(start):
     service = start(cold=True).ready()
     job = service.submitted(service.venue("v", "accept 2"))
     service.running(job)
+    waiting = service.submitted(service.venue("w"))
     worker = service.worker()
     (computing,) = service.begun(job)
     service.kill()
@@ -117,16 +110,8 @@ def test_a_killed_service_leaves_no_process_and_goes_on_when_it_is_back(start):
     service.start()
     ended = service.end(job)
     assert (ended["status"], ended["attempt"]) == ("succeeded", 2)
-    assert poses(service, "v") == [-0.875, -0.875]
-
-
-def test_a_job_whose_202_arrived_survives_the_kill_of_everything(start):
-    service = start().ready()
-    job = service.submitted(service.venue("v"))
-    service.kill()
-    service.start()
-    assert service.end(job)["status"] == "succeeded"
-    assert poses(service, "v") == [-0.875, -0.875]
+    assert service.end(waiting)["status"] == "succeeded"
+    assert poses(service, "v") == poses(service, "w") == [-0.875, -0.875]
 
 
 def test_a_service_that_is_asked_to_stop_does_so_whoever_still_waits(start):

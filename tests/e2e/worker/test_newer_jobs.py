@@ -72,19 +72,13 @@ def test_a_job_with_options_of_a_newer_version_waits_for_a_worker_of_that_versio
     wait_for(lambda: unreadable(service) == 0)
 
 
-def test_a_job_that_no_worker_can_read_can_be_cancelled(start):
+def test_a_job_that_no_worker_can_read_can_be_cancelled_and_its_frames_are_not_submitted_again_otherwise(start):
     service = start("serve")
     job = service.submitted(service.venue("newer"))
     changed(service, job, options=options_of(service, job) | {"zoom": "fit"}, kind="zooming")
     assert service.job(job)["kind"] == "zooming"
     assert service.http.post(f"/jobs/{job}/cancel").json()["status"] == "cancelled"
-
-
-def test_the_frames_of_a_job_of_a_newer_version_are_not_submitted_again_otherwise(start):
-    service = start("serve")
-    job = service.submitted(service.venue("newer"))
-    service.http.post(f"/jobs/{job}/cancel").raise_for_status()
-    changed(service, job, options=options_of(service, job) | {"zoom": "fit"})
+    changed(service, job, kind="calibration")
     answer = service.http.post(f"/jobs/{job}/again")
     assert (answer.status_code, answer.json()["type"]) == (409, "/problems/job-of-newer-version")
     assert "zoom" in answer.json()["detail"]
@@ -104,22 +98,15 @@ def test_a_job_that_a_worker_broke_off_before_it_began_is_put_back(start, begin)
 @pytest.mark.parametrize("given_up", ["MAX_RECOVERY_ATTEMPTS_EXCEEDED", "CANCELLED"])
 def test_one_job_whose_rows_are_broken_does_not_keep_another_from_its_end(start, begin, given_up):
     service = start("serve")
-    first, second = (service.submitted(service.venue(name)) for name in ("first", "second"))
+    first, second, of_broken_venue = (service.submitted(service.venue(name)) for name in ("first", "second", "third"))
     changed(service, first, options={})
     with service.database() as connection:
+        broken = sa.update(tables.venues).where(tables.venues.c.id == "third")
+        connection.execute(broken.values(document={"no": "venue"}))
         connection.exec_driver_sql(f"UPDATE workflow_status SET status = '{given_up}'")
     begin(service, "worker")
-    assert service.end(second)["error"]["type"] == "/problems/job-abandoned"
+    for job in (second, of_broken_venue):
+        assert service.end(job)["error"]["type"] == "/problems/job-abandoned"
     assert service.job(first)["status"] == "queued"
     time.sleep(2 * TAKEOVER_S)
     assert log_of(service).count("cannot end or begin a job that the queue has given up") == 1
-
-
-def test_a_job_of_a_venue_whose_document_is_broken_comes_to_its_end(start, begin):
-    service = start("serve")
-    job = service.submitted(service.venue("broken"))
-    with service.database() as connection:
-        connection.execute(sa.update(tables.venues).values(document={"no": "venue"}))
-        connection.exec_driver_sql("UPDATE workflow_status SET status = 'CANCELLED'")
-    begin(service, "worker")
-    assert service.end(job)["error"]["type"] == "/problems/job-abandoned"

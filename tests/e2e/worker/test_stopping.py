@@ -3,6 +3,8 @@
 import socket
 import time
 
+import pytest
+
 from service.store.database import connect
 from service.store.workers import WorkerRepository
 from tests.e2e.commands import esc_process
@@ -108,10 +110,10 @@ def test_a_worker_whose_name_was_taken_while_it_was_away_ends(start, tmp_path):
     assert "another worker of this name has started" in (service.data / "log").read_text()
 
 
-def test_a_second_service_on_one_folder_is_told_so_and_ends(start):
-    service = start().ready()
+@pytest.mark.parametrize("command", [("up", "--port", "0"), ("worker", "--name", socket.gethostname())])
+def test_a_second_worker_of_one_name_on_one_machine_is_told_so_and_ends(service, command):
     worker = service.worker()
-    second = esc_process(service.data, "up", "--port", "0", **service.environment)
+    second = esc_process(service.data, *command, **service.environment)
     assert second.returncode == 2
     assert f"A worker called {socket.gethostname()} already runs on" in second.stderr
     assert "listens" not in second.stdout
