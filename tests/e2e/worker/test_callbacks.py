@@ -69,18 +69,14 @@ def due_now(service, job: str) -> None:
         connection.execute(sa.update(d).where(d.c.id == job).values(due_at=datetime(2026, 1, 1, tzinfo=UTC)))
 
 
-def test_an_end_that_no_worker_saw_is_told_by_the_next_one(start, receiver, tmp_path):
+def test_an_end_that_no_worker_saw_is_told_by_the_next_one(start, receiver, worker_beside):
     receiver.go.set()
     service = start("serve", **LOCAL)
     job = service.submitted(service.venue("v"), callback_url=receiver.url)
     service.http.post(f"/jobs/{job}/cancel")
-    worker = service.worker_beside(tmp_path / "machine", "next")
+    worker_beside(service, "next")
     service.process.kill()
-    try:
-        wait_for(lambda: receiver.received)
-    finally:
-        worker.kill()
-        worker.wait()
+    wait_for(lambda: receiver.received)
     assert json.loads(receiver.received[0].body)["type"] == "job.cancelled"
 
 

@@ -48,11 +48,11 @@ def test_a_killed_worker_comes_back_and_its_job_ends_once(start):
 
 
 @in_both_homes
-def test_a_worker_on_another_machine_takes_over(start, tmp_path):
+def test_a_worker_on_another_machine_takes_over(start, worker_beside):
     silence_s = 3
     service = start("serve", ESC_TAKEOVER_AFTER_S=str(silence_s))
     service.venue("v", "accept 3")
-    workers = [service.worker_beside(tmp_path / f"machine-{number}", f"worker-{number}") for number in (1, 2)]
+    workers = [worker_beside(service, f"worker-{number}") for number in (1, 2)]
     service.ready()
     job = service.submitted("v")
     service.running(job)
@@ -68,9 +68,6 @@ def test_a_worker_on_another_machine_takes_over(start, tmp_path):
     assert poses(service, "v") == [-0.875, -0.875]
     history = service.http.get("/venues/v/history").json()["revisions"]
     assert [revision["cause"] for revision in history] == ["calibrated", "put"]
-    for process in workers:
-        process.kill()
-        process.wait()
 
 
 @in_both_homes
@@ -173,10 +170,10 @@ def test_while_the_database_is_away_the_service_says_so_and_a_job_goes_on(start,
 
 
 @on_servers
-def test_a_long_absence_of_the_database_is_no_workers_death(start, home, tmp_path):
+def test_a_long_absence_of_the_database_is_no_workers_death(start, home, worker_beside):
     silence_s = 3
     service = start("up", ESC_TAKEOVER_AFTER_S=str(silence_s)).ready()
-    other = service.worker_beside(tmp_path / "other", "other")
+    worker_beside(service, "other")
     wait_for(lambda: '"other"' in (service.data / "log").read_text())
     job = service.submitted(service.venue("v", "accept 7"))
     service.running(job)
@@ -184,8 +181,6 @@ def test_a_long_absence_of_the_database_is_no_workers_death(start, home, tmp_pat
         time.sleep(silence_s + 2)
     ended = service.end(job)
     assert (ended["status"], ended["attempt"]) == ("succeeded", 1)
-    other.kill()
-    other.wait()
 
 
 def test_a_job_that_kills_its_worker_is_given_up_after_three_attempts(start):
