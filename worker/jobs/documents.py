@@ -9,11 +9,9 @@ from __future__ import annotations
 import json
 from collections.abc import Collection, Mapping
 from datetime import datetime
-from typing import TYPE_CHECKING, Any, TypeVar, cast
+from typing import TYPE_CHECKING, Any, cast
 
 if TYPE_CHECKING:
-    from pydantic import BaseModel
-
     from service.schemas.geometry import Intrinsics as Intrinsics
     from service.schemas.geometry import Light as Light
     from service.schemas.geometry import Moved as Moved
@@ -36,8 +34,6 @@ if TYPE_CHECKING:
     from service.schemas.results import View as View
     from service.schemas.trend import Displacement as Displacement
     from service.store.jobs.task import Task
-
-M = TypeVar("M", bound="BaseModel")
 
 
 class Document(dict[str, Any]):
@@ -74,8 +70,3 @@ def parse_task(document: Document) -> Task:
     """Return the task of a request."""
     taken_at = document.taken_at and datetime.fromisoformat(document.taken_at)
     return cast("Task", document.model_copy(update={"taken_at": taken_at}))
-
-
-def document_of(model: M) -> M:
-    """Return a model as the job program gets it."""
-    return cast(M, parse(model.model_dump_json()))

@@ -5,7 +5,12 @@ from dataclasses import replace
 from service.schemas.results import Result
 from worker.jobs import calibration, program
 from worker.jobs.calibration import NO_HISTORY, NightHistory
-from worker.jobs.documents import document_of, parse_task
+from worker.jobs.documents import parse, parse_task
+
+
+def document_of(model):
+    """The document that a job program reads in place of a model."""
+    return parse(model.model_dump_json())
 
 
 def solve(venue, files, options, means, report, nights=NO_HISTORY, **others):
