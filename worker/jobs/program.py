@@ -52,14 +52,14 @@ def main() -> None:
         os.nice(BEHIND_CALIBRATIONS)
     means = ComputeResources(**request["means"] | {"model": Path(request["means"]["model"])})
     try:
-        solution = _compute(request["task"], files, means, lambda progress: parent.told({"progress": progress}))
+        solution = _compute(request["task"], files, means, lambda progress: parent.send({"progress": progress}))
     except JobFailedError as failure:
-        parent.told({"error": failure.error})
+        parent.send({"error": failure.error})
         return
     except Exception as error:
         if not _is_lack_of_memory(error):
             raise
-        parent.told({"error": _without_memory().error})
+        parent.send({"error": _without_memory().error})
         return
     last = {
         "result": solution.result.model_dump(mode="json"),
@@ -67,7 +67,7 @@ def main() -> None:
         "later": list(solution.later),
         "memories": dict(solution.memories),
     }
-    parent.told(last, *solution.pictures.values())
+    parent.send(last, *solution.pictures.values())
 
 
 def _is_lack_of_memory(error: Exception) -> bool:
@@ -183,7 +183,7 @@ class Parent(logging.Handler):
         self._messages = os.fdopen(os.dup(1), "wb")
         os.dup2(2, 1)
 
-    def told(self, message: Mapping[str, Any], *files: bytes) -> None:
+    def send(self, message: Mapping[str, Any], *files: bytes) -> None:
         """Write a `worker.protocol.Message` as a line of JSON, and the files behind it."""
         self._messages.write(encode(message) + b"\n")
         self._messages.writelines(files)
@@ -191,7 +191,7 @@ class Parent(logging.Handler):
 
     def emit(self, record: logging.LogRecord) -> None:
         """Send a line of the log to the parent, which adds the job."""
-        self.told({"warning": self.format(record)})
+        self.send({"warning": self.format(record)})
 
 
 if __name__ == "__main__":

@@ -196,11 +196,11 @@ def _proposal(found: quality.CameraResult) -> Proposal:
 
 def displacement_to_schema(pitch: Field, found: quality.CameraResult, anchor: Anchor | None) -> Displacement | None:
     """Return the displacement of a camera from its anchor, or from itself without one; None if it is unknown."""
-    begun = found.camera if anchor is None else camera_of(anchor.posed)
-    moved = measure_displacement(pitch, begun, found)
+    reference = found.camera if anchor is None else camera_of(anchor.posed)
+    moved = measure_displacement(pitch, reference, found)
     if moved is None:
         return None
-    turned_and_moved = quality.Moved.between(pitch, begun, found.camera)
+    turned_and_moved = quality.Moved.between(pitch, reference, found.camera)
     return Displacement(
         anchor=None if anchor is None else anchor.revision,
         at=moved.place[:2].round(2).tolist(),

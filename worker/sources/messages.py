@@ -59,11 +59,11 @@ class Message:
 
     def all(self, name: str) -> list[str]:
         """The values of a header."""
-        return [value for its, value in self.headers if its.lower() == name.lower()]
+        return [value for key, value in self.headers if key.lower() == name.lower()]
 
     def having(self, name: str, value: str) -> Message:
         """Return the message with one header of this name."""
-        others = [(its, kept) for its, kept in self.headers if its.lower() != name.lower()]
+        others = [(key, kept) for key, kept in self.headers if key.lower() != name.lower()]
         return replace(self, headers=(*others, (name, value)))
 
     def encoded(self) -> bytes:

@@ -81,7 +81,7 @@ class ClipTrack:
         if self._now is None:
             raise VideoError(f"camera {self.camera}: no picture of its clip can be decoded, from where it is to begin")
         self._next = next(self.shots, None)
-        self._heard(self._now)
+        self._collect_sound(self._now)
 
     @property
     def begin_s(self) -> float:
@@ -93,7 +93,7 @@ class ClipTrack:
         own = time_s - self.offset_s
         while self._next is not None and self._now is not None and self._next.time_s - own <= own - self._now.time_s:
             self._now = self._next
-            self._heard(self._now)
+            self._collect_sound(self._now)
             self._next = next(self.shots, None)
         if self._now is None:
             return None
@@ -112,10 +112,10 @@ class ClipTrack:
                     f"and the next good one is {gap:.2f} s later; more than {LONGEST_GAP_S:g} s is not bridged. "
                     "Cut the clip there, or copy it again"
                 )
-        beside = shown.broken or (self._next is not None and self._next.broken)
-        if beside and abs(own - shown.time_s) > LAST_SHOWN * self.interval_s:
+        is_next_to_broken = shown.broken or (self._next is not None and self._next.broken)
+        if is_next_to_broken and abs(own - shown.time_s) > LAST_SHOWN * self.interval_s:
             self.repeated += 1
 
-    def _heard(self, shot: ClipPicture | None) -> None:
+    def _collect_sound(self, shot: ClipPicture | None) -> None:
         if shot is not None:
             self.sound.extend(shot.sound)

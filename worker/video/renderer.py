@@ -98,7 +98,7 @@ class Renderer:
             made: Sequence[Any] = [np.empty(plane.shape, np.uint8) for plane in target]
             _sample(source, at, made)
             if view.lit:
-                made = _evened(view, stretch, made)
+                made = _corrected(view, stretch, made)
             for plane, new, share in zip(target, made, stretch.share or 3 * (None,), strict=True):
                 plane[:] = new if share is None else cv2.blendLinear(new, plane, share, 1 - share)
 
@@ -286,7 +286,7 @@ def _sample(source: Planes, maps: _Maps, target: Sequence[Plane]) -> None:
         cv2.remap(plane, *at, cv2.INTER_LINEAR, onto, cv2.BORDER_REPLICATE)
 
 
-def _evened(view: _View, stretch: _Stretch, planes: Sequence[Any]) -> Sequence[Any]:
+def _corrected(view: _View, stretch: _Stretch, planes: Sequence[Any]) -> Sequence[Any]:
     """Return the planes with the camera's photometric correction."""
     luma, blue, red = planes
     coarse: Any = cv2.resize(luma, (blue.shape[1], blue.shape[0]), interpolation=cv2.INTER_AREA)

@@ -194,9 +194,9 @@ def stitch(
         clips = {
             camera: stack.enter_context(Clip.open(camera, address, started)) for camera, address in addresses.items()
         }
-        heard = _heard(clips, plan.sound)
-        if heard is not None:
-            heard.listen()
+        sound_clip = _sound_clip(clips, plan.sound)
+        if sound_clip is not None:
+            sound_clip.listen()
         fitted = {camera.id: camera_for_clip(camera, clips.get(camera.id)) for camera in scene.cameras}
         offsets, found = _offsets(scene, clips, fitted, plan, report)
         rate = plan.rate or next(iter(clips.values())).facts.rate
@@ -215,7 +215,7 @@ def stitch(
         geometry = follow(scene.pitch, view, shown, light, rate)
         ends = _ends(clips, offsets)
         expected = _expected(ends, moments.begin_s, rate, plan)
-        sound = None if heard is None else Sound(heard, moments.begin_s - offsets[heard.camera])
+        sound = None if sound_clip is None else Sound(sound_clip, moments.begin_s - offsets[sound_clip.camera])
         with Writer(plan.output, view.size, rate, plan.encoding, sound) as writer:
             for made in _rendered(moments, geometry, view.size, writer, plan.threads):
                 if moments.count == 1:
@@ -296,11 +296,11 @@ class ClipMoments:
 
     def sound(self) -> list[Packet[AudioStream]]:
         """Return the sound since the last call."""
-        heard = []
+        packets = []
         for track in self.tracks.values():
-            heard += track.sound
+            packets += track.sound
             track.sound = []
-        return heard
+        return packets
 
     def _now(self) -> dict[str, Picture]:
         """Return the pictures of the present moment, none after the end."""
@@ -339,7 +339,7 @@ def _check_cameras(scene: StitchScene, addresses: Mapping[str, str], plan: Plan)
         )
 
 
-def _heard(clips: Mapping[str, Clip], wanted: str | None) -> Clip | None:
+def _sound_clip(clips: Mapping[str, Clip], wanted: str | None) -> Clip | None:
     """Return the clip whose sound is kept."""
     if wanted == SILENT:
         return None

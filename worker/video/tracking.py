@@ -87,10 +87,10 @@ class _TrackedGeometry:
     def at(self, number: int, pictures: Mapping[str, Picture]) -> Panorama:  # noqa: ARG002
         """Return the panorama of the next pictures, of the cameras that have one."""
         if self._follower is None:
-            self._follower = self._begun(pictures)
+            self._follower = self._start_tracking(pictures)
         else:
-            looked = pictures if self._follower.looks else {}
-            self._follower.see(looked)
+            measured = pictures if self._follower.looks else {}
+            self._follower.see(measured)
         self._report(self._follower, self._follower.settled())
         return self._panorama(self._follower, frozenset(pictures))
 
@@ -99,7 +99,7 @@ class _TrackedGeometry:
         if self._follower is not None:
             self._report(self._follower, self._follower.rest())
 
-    def _begun(self, pictures: Mapping[str, Picture]) -> CameraTracker:
+    def _start_tracking(self, pictures: Mapping[str, Picture]) -> CameraTracker:
         seen = [camera for camera in self.cameras if camera.id in pictures]
         first = {camera.id: pictures[camera.id].colours for camera in seen}
         ahead = round(LOOK_AHEAD_S * self.rate)
