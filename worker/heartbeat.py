@@ -40,12 +40,14 @@ class Heartbeat:
         self._go_on(self._workers.beat(self._name, self._token))
 
     def beat_and_listen(self, unreadable_jobs: Collection[str]) -> Round | None:
-        """Send a heartbeat, return what is silent; None if another worker of this name has started meanwhile.
+        """Send a heartbeat; return the silent workers and jobs, or None if another worker of this name has started.
 
         `unreadable_jobs`: those that wait and that this worker cannot read; they are not among the silent ones.
         """
-        heard = self._workers.beat_and_listen(self._name, self._token, self._settings.takeover_after_s, unreadable_jobs)
-        return heard if self._go_on(heard.is_of_this_start) else None
+        silence = self._workers.beat_and_listen(
+            self._name, self._token, self._settings.takeover_after_s, unreadable_jobs
+        )
+        return silence if self._go_on(silence.is_of_this_start) else None
 
     def _go_on(self, is_of_this_start: bool) -> bool:
         """Return whether this start goes on, which it does not once another one has its name."""

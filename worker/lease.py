@@ -85,13 +85,13 @@ class Leases:
             return task.run_token in self._lost
 
     def _ask(self) -> set[str]:
-        """Return the fencing tokens of the attempts that hold their leases; renew them when that is due."""
+        """Return the fencing tokens whose leases are valid; renew these leases when that is due."""
         is_due = time.monotonic() - self._renewed_at >= BEAT_S
         if is_due:
             self._renewed_at = time.monotonic()
-        held = self._attempts.check_leases(self._tasks.values(), self._progress, renew=is_due)
+        valid = self._attempts.check_leases(self._tasks.values(), self._progress, renew=is_due)
         self._progress = {}
-        return held
+        return valid
 
 
 class Lease:

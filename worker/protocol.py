@@ -53,11 +53,11 @@ class Message(BaseModel):
     warning: str | None = None
     result: AnyResult | None = None
     error: JobError | None = None
-    # Beside a result: the pictures that follow, and their bytes.
+    # With a result: the pictures that follow, and their bytes.
     pictures: dict[str, int] = {}
-    # The names of those that can be drawn when somebody looks.
+    # With a result: the names of pictures that can be drawn when somebody looks.
     later: list[str] = []
-    # Of a calibration: the memories of the accepted cameras with this job in them, by camera.
+    # With the result of a calibration: the memories of the accepted cameras with this job in them, by camera.
     memories: dict[str, dict[str, Any]] = {}
 
     @property
@@ -75,7 +75,7 @@ class Message(BaseModel):
 
     @property
     def outcome(self) -> dict[str, Any]:
-        """Return the verdict, and where it is none to be glad of, why, and the cameras that it is about."""
+        """Return the verdict, with the reason and the cameras of a rejection or failure, for the log."""
         named: dict[str, Any] = {}
         match self.result:
             case None if self.error is not None:

@@ -10,7 +10,6 @@ from opentelemetry import trace
 from opentelemetry.trace import Span, SpanKind, StatusCode
 
 from service.observability import tracing
-from service.schemas.results import IntrinsicsResult, Result
 from service.store.jobs.task import Task
 from worker.protocol import Message
 
@@ -64,13 +63,10 @@ class Spans:
         """Set the outcome of the attempt; None: its lease was lost."""
         if last is None:
             self._whole.set_attribute("esc.outcome", "taken away")
-        elif isinstance(last.result, IntrinsicsResult):
-            self._whole.set_attribute("esc.outcome", "succeeded")
-        elif isinstance(last.result, Result):
-            self._whole.set_attribute("esc.outcome", last.result.verdict)
-        elif last.result is not None:
-            self._whole.set_attribute("esc.outcome", "accepted" if last.result.accepted else "rejected")
         elif last.error is not None:
             self._whole.set_attribute("esc.outcome", "failed")
             self._whole.set_attribute("error.type", last.error.type)
             self._whole.set_status(StatusCode.ERROR, last.error.detail)
+        elif (verdict := last.verdict) is not None:
+            # A lens has no verdict of its own.
+            self._whole.set_attribute("esc.outcome", "succeeded" if verdict == "found" else verdict)

@@ -83,7 +83,7 @@ class Worker:
         self._leases = Leases(home.attempts)
         self._heartbeat = Heartbeat(settings, home.workers, place)
         self._hand_back = home.queue.hand_back
-        # Jobs that wait for a worker of a newer version, and those whose rows are broken: each is told of once.
+        # Jobs that wait for a worker of a newer version, and those whose rows are broken: each is logged once.
         self._unreadable: set[str] = set()
         self._broken: set[str] = set()
         self._files = JobFiles(settings)
@@ -92,9 +92,9 @@ class Worker:
         )
         expiry = ExpiryRepository(without_timeouts(home.engine))
         self._retention = Retention(settings, expiry, home.blobs, home.workers, self._queue.forget)
-        self._delivering = WebhookDelivery(settings, home.outbox, home.jobs, home.events, home.outbox.now)
+        self._webhooks = WebhookDelivery(settings, home.outbox, home.jobs, home.events, home.outbox.now)
         self._alarms = AlarmTimer(home.venues)
-        self._scheduled = Scheduler(
+        self._scheduler = Scheduler(
             settings, home.schedules, home.venues, home.submissions, home.from_sources, home.disk
         )
 
@@ -118,24 +118,24 @@ class Worker:
 
         The duties (retention, webhook delivery, alarms, schedules) run in a thread each beside it.
         """
-        for poll in (self._retention.poll, self._delivering.poll, self._alarms.poll, self._scheduled.poll):
+        for poll in (self._retention.poll, self._webhooks.poll, self._alarms.poll, self._scheduler.poll):
             threading.Thread(target=_run_duty, args=(poll, stop), daemon=True).start()
-        beaten, judging_from = time.monotonic(), 0.0
+        last_beat, silence_counts_from = time.monotonic(), 0.0
         while not stop.wait(BEAT_S):
             try:
-                # Of that moment: the threads of jobs add to it.
+                # A copy: the threads of jobs add to it.
                 unreadable = set(self._unreadable)
-                heard = self._heartbeat.beat_and_listen(unreadable)
-                if heard is None:
+                silence = self._heartbeat.beat_and_listen(unreadable)
+                if silence is None:
                     return
-                before, beaten = beaten, time.monotonic()
-                if beaten - before > 2 * BEAT_S:
+                beat_before, last_beat = last_beat, time.monotonic()
+                if last_beat - beat_before > 2 * BEAT_S:
                     # The database was away and nobody could send a heartbeat: silence proves nothing yet.
-                    judging_from = beaten + self._settings.takeover_after_s
-                if beaten >= judging_from:
-                    self._take_over(heard.silent_workers)
-                self._forget_those_that_do_not_wait(unreadable)
-                self._reconcile(heard.silent_jobs)
+                    silence_counts_from = last_beat + self._settings.takeover_after_s
+                if last_beat >= silence_counts_from:
+                    self._take_over(silence.silent_workers)
+                self._unreadable -= unreadable - self._attempts.still_waiting(unreadable)
+                self._reconcile(silence.silent_jobs)
             except Exception:  # the database is away: the next round tries again
                 log.warning("cannot look after the jobs", exc_info=True)
 
@@ -146,20 +146,20 @@ class Worker:
         """
         self._queue.stop_taking()
         over = time.monotonic() + self._settings.drain_s
-        self._scheduled.finish(self._settings.drain_s)
-        beaten = 0.0
+        self._scheduler.finish(self._settings.drain_s)
+        last_beat = 0.0
         while not self._queue.is_idle() and time.monotonic() < over and not hurry.wait(DRAIN_POLL_S):
-            if time.monotonic() - beaten >= BEAT_S:
+            if time.monotonic() - last_beat >= BEAT_S:
                 with suppress(*DATABASE_OUTAGES):
                     self._heartbeat.beat()
-                beaten = time.monotonic()
+                last_beat = time.monotonic()
         for job_id, task in list(self._running.items()):
             with suppress(*DATABASE_OUTAGES):
-                self._give_back(job_id, task)
+                self._release(job_id, task)
         with suppress(*DATABASE_OUTAGES):
             self._heartbeat.end()
 
-    def _give_back(self, job_id: str, task: Task) -> None:
+    def _release(self, job_id: str, task: Task) -> None:
         self._handed_back.add(job_id)
         if self._attempts.hand_back(task):
             self._hand_back(job_id, task.kind)
@@ -171,9 +171,6 @@ class Worker:
             self._queue.take_over(dead)
             for name in dead:
                 self._workers.forget(name, self._settings.takeover_after_s)
-
-    def _forget_those_that_do_not_wait(self, unreadable: set[str]) -> None:
-        self._unreadable -= unreadable - self._attempts.still_waiting(unreadable)
 
     def _reconcile(self, silent: Sequence[str]) -> None:
         given_up = self._queue.given_up(silent) if silent else {}
@@ -252,7 +249,7 @@ class Worker:
         """Return the last message about the job; None if the lease was lost."""
         try:
             with self._leases.begin(task, limit_s) as lease:
-                files = _run_beside(lambda: self._files.frames(task), lease.check)
+                files = _run_with_checks(lambda: self._files.frames(task), lease.check)
                 last, pictures = self._run_program(task, files, lease, spans)
                 return self._store_pictures(task, last, pictures, lease)
         except LeaseLostError:
@@ -265,7 +262,7 @@ class Worker:
     def _store_pictures(self, task: Task, last: Message, pictures: dict[str, bytes], lease: Lease) -> Message:
         """Store the pictures. A result outlives pictures that cannot be stored: it gets a warning instead."""
         try:
-            _run_beside(lambda: self._files.keep(task, pictures), lease.check)
+            _run_with_checks(lambda: self._files.keep(task, pictures), lease.check)
         except FileUnavailableError as missing:
             if last.result is None:
                 raise
@@ -314,18 +311,18 @@ def _retry_until(write: Callable[[], Answer], until: float) -> Answer:
 
 
 def _run_duty(poll: Callable[[], float], stop: threading.Event) -> None:
-    """Call `poll` until `stop` is set; it returns the seconds until its next call. Errors put the call off."""
+    """Call `poll` until `stop` is set; it returns the seconds until its next call. Retry after errors."""
     pause_s = 0.0
     while not stop.wait(pause_s):
         try:
             pause_s = poll()
         except Exception:  # the database or the store is away: the next call tries again
-            log.warning("put off", duty=poll.__qualname__, exc_info=True)
+            log.warning("duty failed, it is tried again", duty=poll.__qualname__, exc_info=True)
             pause_s = DUTY_RETRY_S
 
 
-def _run_beside(work: Callable[[], Answer], check: Callable[[], None]) -> Answer:
-    """Return the result of `work`, which may wait for the store, and call `check` meanwhile.
+def _run_with_checks(work: Callable[[], Answer], check: Callable[[], None]) -> Answer:
+    """Run `work`, which may wait for the store, in a thread, and call `check` until it is done; return its result.
 
     If `check` raises, `work` goes on in its thread and its result is dropped.
     """

@@ -1,4 +1,4 @@
-"""How good a model is: on frames of real venues with known poses, or on rendered venues it has never seen.
+"""Evaluation of a model: on frames of real venues with known poses, or on rendered venues it has never seen.
 
     python -m models.training.evaluate --rendered 200
     python -m models.training.evaluate --real FOLDER --write OUT

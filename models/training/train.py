@@ -78,7 +78,7 @@ def main() -> None:
 
 @dataclass(frozen=True)
 class Budget:
-    """How long to train: by the clock, so that a slow machine finishes too; or by steps, to compare recipes."""
+    """Limits of a training: by the clock, so that a slow machine finishes too; or by steps, to compare recipes."""
 
     seconds: float
     steps: int | None = None
@@ -90,7 +90,7 @@ class Budget:
 
 @dataclass(frozen=True)
 class Recipe:
-    """What is trained, and how: slope of LeakyReLU below 0 (0 is ReLU), exponent of the focal loss, first rate.
+    """Network and hyperparameters: slope of LeakyReLU below 0 (0 is ReLU), exponent of the focal loss, first rate.
 
     `normalised`: with batch normalisation.
     """
@@ -102,7 +102,7 @@ class Recipe:
     normalised: bool = True
 
     def __str__(self) -> str:
-        """As a name of a file."""
+        """Return the name of the recipe in names of files."""
         plain = "" if self.normalised else "-plain"
         return f"{self.shape}-leak-{self.leak:g}-gamma-{self.gamma:g}{plain}".replace("/", "by")
 
@@ -156,7 +156,7 @@ class Training:
                 mean.copy_(value)
 
     def save(self) -> None:
-        """Everything needed to go on."""
+        """Write a checkpoint from which the training can be resumed."""
         partial = self.checkpoint.with_suffix(".partial")
         state = {
             "shape": str(self.recipe.shape),

@@ -6,15 +6,15 @@ NumPy and OpenCV read the environment when they are loaded: such a command impor
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
 
 from service.cli.arguments import parse_frame_files
 from service.cli.printing import FAILED, fail, problem_text
 from service.cli.progress import progress_bar
 from service.cli.service_settings import load_settings
 from service.intake import image_checks
+from service.schemas.job import Progress
 from service.schemas.problems import Problem
 from service.schemas.venue import Venue
 from service.settings import Settings
@@ -53,7 +53,7 @@ def report_job_failures() -> Iterator[None]:
 
 
 @contextmanager
-def engine_progress() -> Iterator[Callable[[Mapping[str, Any]], None]]:
+def engine_progress() -> Iterator[Callable[[Progress], None]]:
     """Show a progress bar of the steps that the yielded function takes; exit with a line where the job fails."""
     with report_job_failures(), progress_bar() as show:
-        yield lambda step: show(step["stage"], step["fraction"])
+        yield lambda step: show(step.stage, step.fraction)

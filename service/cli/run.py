@@ -43,7 +43,7 @@ def run(
         print_note("callback_url is not used: without a service nobody is told. The exit code says how it went.")
     from worker.calibration.records import NOT_RECORDED
     from worker.compute_resources import ComputeResources
-    from worker.jobs import calibration, inputs
+    from worker.jobs import calibration
     from worker.jobs.debugging import DebugRecorder
 
     stored = parse_document(VenueIn, venue.read_bytes(), str(venue)).to_venue()
@@ -55,9 +55,9 @@ def run(
     try:
         with engine_progress() as show:
             solution = calibration.solve(
-                inputs.read_record(inputs.Venue, stored.model_dump(mode="json")),
+                stored,
                 files,
-                inputs.read_record(inputs.Options, job_options.model_dump(mode="json")),
+                job_options,
                 resources,
                 show,
                 recorder=recorder,

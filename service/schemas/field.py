@@ -19,7 +19,7 @@ from pydantic import (
     model_validator,
 )
 
-from fields.plans import TEMPLATE_MEASURES, markings_of, other_shapes, plan_of, size_of
+from fields.plans import TEMPLATE_MEASURES, markings_of, plan_of, size_of
 from fields.shapes import COLOUR_PATTERN, WHITE, Shape
 from fields.sports import LONGEST, nearest_template_name, template_name
 from fields.template import NAMES, Extent, Template, load
@@ -322,11 +322,6 @@ class FieldOfPlay(Schema):
     def _template(self) -> str | dict[str, Any]:
         """Name of the template, or the layout as `fields.plans` takes it."""
         return self.template if isinstance(self.template, str) else self.template.model_dump()
-
-    @property
-    def others(self) -> list[Shape]:
-        """Markings of `other_markings`."""
-        return other_shapes([other.model_dump() for other in self.other_markings], self.size)
 
     @property
     def size(self) -> dict[str, float]:

@@ -1,42 +1,32 @@
-"""Rejection of a whole result after the quality gate, for models of results and for plain dictionaries."""
+"""Refusal of a result after the engine's gate has accepted it."""
 
 from __future__ import annotations
 
-from typing import TypedDict
+from typing import TYPE_CHECKING
 
-from service.schemas.names import Verdict, refusal_uri
+from service.schemas.names import refusal_uri
 
-
-class CameraRefusal(TypedDict):
-    """Members of a camera's result that a rejection of all poses changes."""
-
-    accepted: bool
-    rejected_because: str
-    refusal: str | None
+if TYPE_CHECKING:
+    from service.schemas.results import Result
 
 
-class ResultRefusal(TypedDict):
-    """Members of a result, besides its cameras, that a rejection of all poses changes."""
+def refuse(result: Result, because: str, reason: str = "all-or-none") -> Result:
+    """Return a result with every pose refused, for a reason of `REFUSAL_REASONS` (`service.schemas.problems`).
 
-    verdict: Verdict
-    accepted: bool
-    rejected_because: str
-
-
-def refuse_camera(rejected_because: str | None, refusal: str | None, because: str, reason: str) -> CameraRefusal:
-    """Reject a camera for one of `REFUSAL_REASONS`; a camera that is rejected already keeps its own reason."""
-    return {
-        "accepted": False,
-        "rejected_because": rejected_because or because,
-        "refusal": refusal if rejected_because else refusal_uri(reason),
-    }
-
-
-def refuse_result(rejected_because: str | None, because: str) -> ResultRefusal:
-    """Reject a result, adding a reason to those that it has."""
-    reasons = [because] if rejected_because is None else [rejected_because, because]
-    return {
-        "verdict": "rejected",
-        "accepted": False,
-        "rejected_because": "; ".join(one.removesuffix(".") for one in reasons),
-    }
+    The reasons that it was rejected for before stay. It may also be a document of `worker.jobs.documents`.
+    """
+    cameras = [
+        camera.model_copy(
+            update={
+                "accepted": False,
+                "rejected_because": camera.rejected_because or because,
+                "refusal": camera.refusal if camera.rejected_because else refusal_uri(reason),
+            }
+        )
+        for camera in result.cameras
+    ]
+    reasons = [because] if result.rejected_because is None else [result.rejected_because, because]
+    summary = "; ".join(one.removesuffix(".") for one in reasons)
+    return result.model_copy(
+        update={"verdict": "rejected", "accepted": False, "rejected_because": summary, "cameras": cameras}
+    )

@@ -14,7 +14,6 @@ from service.schemas.field import FieldOfPlay
 from service.schemas.geometry import Intrinsics, Light, Moved, Pose, Row
 from service.schemas.names import FieldNumber, Verdict
 from service.schemas.options import Coordinates, Landmark
-from service.schemas.refusals import refuse_camera, refuse_result
 from service.schemas.trend import Displacement
 
 NO_CHOICE: Mapping[str, int | None] = MappingProxyType({})
@@ -311,14 +310,6 @@ class Result(Schema):
     def accepted_cameras(self) -> list[str]:
         """Ids of the cameras whose poses may replace the stored ones."""
         return [camera.id for camera in self.cameras if camera.accepted]
-
-    def refused(self, because: str, reason: str = "all-or-none") -> Result:
-        """Return the result with every pose rejected; `reason`: one of `service.schemas.problems.REFUSAL_REASONS`."""
-        cameras = [
-            camera.model_copy(update={**refuse_camera(camera.rejected_because, camera.refusal, because, reason)})
-            for camera in self.cameras
-        ]
-        return self.model_copy(update={**refuse_result(self.rejected_because, because), "cameras": cameras})
 
 
 class PhotoResult(Schema):

@@ -5,10 +5,7 @@ from __future__ import annotations
 import hashlib
 import re
 import socket
-import ssl
-import threading
 from base64 import b64encode
-from contextlib import suppress
 from itertools import takewhile
 from pathlib import Path
 from typing import Any
@@ -16,41 +13,24 @@ from typing import Any
 import cv2
 import numpy as np
 
+from tests.listener import Listener
+
 USER, PASSWORD = "user", "pass word"
 PICTURE = cv2.imencode(".jpg", np.random.default_rng(0).integers(0, 255, (200, 300, 3), np.uint8))[1].tobytes()
 HASHES = {"MD5": "md5", "SHA-256": "sha256", "SHA-512-256": "sha512_256"}
 
 
-class StubCamera:
+class StubCamera(Listener):
     """Answers each request as its dialect says; `proofs`: what came with requests to prove their user."""
 
     def __init__(self, dialect: dict[str, Any], host: str = "127.0.0.1", certificate: Path | None = None) -> None:
         self.proofs: list[str] = []
         self.requests: list[str] = []
-        self._tls = None
-        if certificate is not None:
-            self._tls = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
-            self._tls.load_cert_chain(certificate)
         self._dialect = dialect
-        self._listener = socket.create_server((host, 0))
-        self.port = self._listener.getsockname()[1]
-        threading.Thread(target=self._accept, daemon=True).start()
+        super().__init__(host, certificate)
 
-    def close(self) -> None:
-        # A thread that waits for the next connection is woken by it.
-        self._listener.shutdown(socket.SHUT_RDWR)
-        self._listener.close()
-
-    def _accept(self) -> None:
-        with suppress(OSError):
-            while True:
-                connection, _ = self._listener.accept()
-                threading.Thread(target=self._converse, args=(connection,), daemon=True).start()
-
-    def _converse(self, connection: socket.socket) -> None:
-        with suppress(OSError):
-            connection = self._tls.wrap_socket(connection, server_side=True) if self._tls else connection
-        with connection, suppress(OSError), connection.makefile("rb") as lines:
+    def converse(self, connection: socket.socket) -> None:
+        with connection.makefile("rb") as lines:
             while head := b"".join(takewhile(lambda line: line not in (b"", b"\r\n"), lines)).decode():
                 connection.sendall(self._answer(head))
                 if not self._dialect.get("keeps"):

@@ -1,5 +1,6 @@
 """A receiver of webhooks on a real socket."""
 
+import socket
 import ssl
 import threading
 import time
@@ -7,6 +8,8 @@ from contextlib import suppress
 from dataclasses import dataclass
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+
+import pytest
 
 # What servers say of their own accord, which nobody is to read through the service.
 TELLTALE = (
@@ -118,3 +121,16 @@ class Telltale(Receiver):
     def respond(self, request: BaseHTTPRequestHandler, _: int) -> None:
         request.wfile.write(self.says)
         request.close_connection = True
+
+
+def resolve_to(monkeypatch: pytest.MonkeyPatch, *answers: list[str]) -> list[str]:
+    """Let every name have these addresses, the last answer for ever; returns the list of names that were looked up."""
+    asked, left = [], list(answers)
+
+    def getaddrinfo(name, port, *_, **__):
+        asked.append(name)
+        answer = left.pop(0) if len(left) > 1 else left[0]
+        return [(socket.AF_INET, socket.SOCK_STREAM, 6, "", (address, port)) for address in answer]
+
+    monkeypatch.setattr(socket, "getaddrinfo", getaddrinfo)
+    return asked

@@ -1,12 +1,10 @@
 import shutil
-import threading
-from contextlib import contextmanager
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import pytest
 
 from service.store import blobs
 from service.store.blobs import Blobs
+from tests.listener import Parrot
 from worker.job_files import FileUnavailableError, JobFiles
 
 
@@ -60,25 +58,15 @@ def test_a_frame_that_the_network_damaged_once_is_read_again(stock, monkeypatch)
 
 def test_what_the_server_of_a_bucket_says_is_not_told(stock, monkeypatch):
     task = stock.attempts.begin(stock.submitted("v"))
-    with bucket_that_says(b"HTTP/1.1 403 hunter2\r\nContent-Length: 7\r\n\r\nhunter2") as address:
-        settings = {"ENDPOINT_URL": address, "ALLOW_HTTP": "true", "ACCESS_KEY_ID": "k", "SECRET_ACCESS_KEY": "s"}
+    with Parrot(b"HTTP/1.1 403 hunter2\r\nContent-Length: 7\r\n\r\nhunter2") as bucket:
+        settings = {
+            "ENDPOINT_URL": f"http://{bucket.host}",
+            "ALLOW_HTTP": "true",
+            "ACCESS_KEY_ID": "k",
+            "SECRET_ACCESS_KEY": "s",
+        }
         for name, value in settings.items():
             monkeypatch.setenv(f"AWS_{name}", value)
         with pytest.raises(FileUnavailableError) as refused:
             JobFiles(stock.settings.model_copy(update={"blob_url": "s3://bucket"})).frames(task)
     assert str(refused.value) == "A stored frame cannot be read: the bucket does not take the service's credentials"
-
-
-@contextmanager
-def bucket_that_says(answer):
-    """The address of a server that says the same whatever it is asked."""
-
-    class Handler(BaseHTTPRequestHandler):
-        def do_GET(self):
-            self.wfile.write(answer)
-            self.close_connection = True
-
-    with ThreadingHTTPServer(("127.0.0.1", 0), Handler) as server:
-        threading.Thread(target=server.serve_forever, args=(0.05,), daemon=True).start()
-        yield f"http://127.0.0.1:{server.server_port}"
-        server.shutdown()

@@ -137,6 +137,6 @@ def test_what_computes_a_job_loads_nothing_of_the_web_the_database_or_the_store(
 
 
 def test_a_calibration_begins_without_the_models_of_the_wire_and_without_the_network():
-    loaded = loaded_by("calibration", "inputs")
+    loaded = loaded_by("calibration")
     assert loaded >= {"numpy", "cv2"}
     assert not loaded & {"pydantic", "pydantic_core", "annotated_types", "onnxruntime"}

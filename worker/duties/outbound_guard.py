@@ -69,23 +69,12 @@ def failure_text(error: httpx.HTTPError) -> str:
             return f"no answer that can be read ({type(error).__name__})"
 
 
-def stream(
-    client: httpx.AsyncClient,
-    method: str,
-    target: httpx.URL,
-    address: str,
-    *,
-    content: bytes | None = None,
-    headers: Mapping[str, str] | None = None,
-    auth: httpx.Auth | None = None,
+def post(
+    client: httpx.AsyncClient, target: httpx.URL, address: str, content: bytes, headers: Mapping[str, str]
 ) -> AbstractAsyncContextManager[httpx.Response]:
-    """Send a request to the host of a URL at one of its addresses; the response streams."""
-    head = {
-        **(headers or {}),
-        "Host": target.netloc.decode("ascii"),
-        "User-Agent": f"esc/{version('esc-calibration')}",
-    }
+    """POST to the host of a URL at one of its addresses; the response streams."""
+    head = {**headers, "Host": target.netloc.decode("ascii"), "User-Agent": f"esc/{version('esc-calibration')}"}
     # The certificate is checked against the name, whatever address the connection goes to.
     name = {"sni_hostname": target.raw_host.decode("ascii")}
     at = target.copy_with(host=address)
-    return client.stream(method, at, content=content, headers=head, extensions=name, auth=auth)
+    return client.stream("POST", at, content=content, headers=head, extensions=name)

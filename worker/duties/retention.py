@@ -21,7 +21,7 @@ from service.store.expiry import ExpiryRepository, OldFrames
 from service.store.jobs.files import drawn_together, picture_file, source_file
 from service.store.workers import WorkerRepository
 
-# Of each kind per round: some seconds on a bucket, a fraction of one in a folder.
+# Most of each kind per round: they take some seconds on a bucket, a fraction of one in a folder.
 BATCH = 100
 # Two when its files are past their time, and two more when it is: a round that finds a batch of each deletes as many.
 FOLDERS_OF_A_JOB = 4

@@ -29,7 +29,7 @@ class BoundedThreadPool:
 
     @property
     def busy_by_owner(self) -> Counter[str]:
-        """How many threads are busy, by owner."""
+        """Number of busy threads by owner."""
         self._busy = {future: owner for future, owner in self._busy.items() if not future.done()}
         return Counter(self._busy.values())
 
@@ -50,4 +50,4 @@ def _run(work: Callable[[], None], owner: str) -> None:
     try:
         work()
     except Exception:  # the database or the store is away: what was not done is due again
-        log.warning("put off", whom=owner, exc_info=True)
+        log.warning("failed, it is tried again", owner=owner, exc_info=True)

@@ -87,17 +87,17 @@ class WebhookDelivery:
     def _attempt(self, delivery: Delivery) -> None:
         unreadable = None
         try:
-            told = self._event(delivery)
+            event = self._event(delivery)
         except UnreadableRow as error:
-            told, unreadable = None, error
+            event, unreadable = None, error
         with structlog.contextvars.bound_contextvars(
-            **_names(delivery, told), receiver=delivery.receiver, attempt=delivery.attempt
+            **_names(delivery, event), receiver=delivery.receiver, attempt=delivery.attempt
         ):
-            if told is None:
+            if event is None:
                 self._give_up(delivery, f"the {unreadable}" if unreadable else "what was to be told is no longer kept")
                 return
             try:
-                answer = self._send(delivery, told.model_dump_json().encode())
+                answer = self._send(delivery, event.model_dump_json().encode())
             except webhook_request.SendError as error:
                 self._failed(delivery, str(error))
                 return
@@ -138,12 +138,12 @@ class WebhookDelivery:
         log.error("callback given up", why=why)
 
 
-def _names(delivery: Delivery, told: Event | None) -> dict[str, Any]:
+def _names(delivery: Delivery, event: Event | None) -> dict[str, Any]:
     """Return what a line of the log says of a delivery: what it tells, of which venue and job."""
     # `event` is the line's own text.
     names: dict[str, Any] = {"event_id": delivery.event} if delivery.event is not None else {"job": delivery.id}
-    if told is not None:
-        names |= {"what": told.type, "venue": told.data.venue}
-    if isinstance(told, JobEvent):
-        names["job"] = told.data.id
+    if event is not None:
+        names |= {"what": event.type, "venue": event.data.venue}
+    if isinstance(event, JobEvent):
+        names["job"] = event.data.id
     return names

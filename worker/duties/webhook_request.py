@@ -101,6 +101,6 @@ async def _within(
 async def _post(
     client: httpx.AsyncClient, target: httpx.URL, address: str, body: bytes, head: Mapping[str, str]
 ) -> WebhookResponse:
-    async with outbound_guard.stream(client, "POST", target, address, content=body, headers=head) as response:
+    async with outbound_guard.post(client, target, address, body, head) as response:
         asked = response.headers.get("retry-after", "")
         return WebhookResponse(response.status_code, int(asked[:9]) if asked.isascii() and asked.isdecimal() else 0)

@@ -6,25 +6,24 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from datetime import datetime
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from service.schemas.refusals import refuse_camera, refuse_result
+from service.schemas.lens_map import lens_warnings
+from service.schemas.refusals import refuse
 from service.store.jobs.files import names_of_all
 from worker.calibration import records as engine
 from worker.calibration.calibrate import calibrate
 from worker.calibration.detection.view_condition import UsualView
-from worker.calibration.gate.quality import Gate
+from worker.calibration.gate import quality
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.parameters import field_measures
 from worker.calibration.memory.camera_memory import CameraMemory, memories_of_field
 from worker.calibration.refinement import diagnosis
 from worker.calibration.stitching.photometry import Light
 from worker.compute_resources import ComputeResources
-from worker.jobs import frames_job
-from worker.jobs.answers import AdoptableNumber, CameraResult, Progress, Provenance, Result, Suspicion
-from worker.jobs.frames_job import EngineInputs, JobPictures
+from worker.jobs.documents import AdoptableNumber, CameraResult, Progress, Result, Suspicion, View
+from worker.jobs.frames_job import FramesJob
 from worker.jobs.from_schemas import light_of
-from worker.jobs.inputs import Anchor, Options, Venue, View
 from worker.jobs.masks import masks
 from worker.jobs.nights import lens_change_to_schema, read_memories, refined_to_schema
 from worker.jobs.to_schemas import (
@@ -38,6 +37,11 @@ from worker.jobs.to_schemas import (
     pair_to_schema,
     round_to_ms,
 )
+
+if TYPE_CHECKING:
+    from service.schemas.options import Options
+    from service.schemas.trend import Anchor
+    from service.schemas.venue import Venue
 
 
 @dataclass(frozen=True)
@@ -71,56 +75,60 @@ def solve(
     nights: NightHistory = NO_HISTORY,
     recorder: engine.Recorder = engine.NOT_RECORDED,
 ) -> Solution[Result]:
-    """Calibrate a venue from the files of its cameras, by what is known of its `nights`."""
-    asked = _engine_options(venue, options)
+    """Calibrate a venue from the files of its cameras, by what is known of its `nights`.
+
+    `venue` and `options` may be models or documents of `worker.jobs.documents`; the result is a document.
+    """
+    job = FramesJob.prepare(venue, files, options, means, report)
     memories = read_memories(nights.memories)
-    return frames_job.solve(
-        venue,
-        files,
-        dict(vars(options)),
-        means,
-        report,
-        lambda given, step: _method(options)(
-            given.pitch,
-            given.cameras,
-            given.frames,
-            given.network,
-            asked,
+    with job.engine() as step:
+        found = _method(options)(
+            job.pitch,
+            job.cameras,
+            job.frames,
+            job.network,
+            _engine_options(venue, options),
             step,
             usual=nights.usual,
             memories=memories,
             taken_at=nights.taken_at,
             recorder=recorder,
-        ),
-        lambda given, found: _drawn(venue, given, found, options),
-        lambda found, spent, provenance, warnings: _allowed(
-            venue, options, _result(venue, found, options, spent, provenance, warnings, memories, nights)
-        ),
-        lambda found: {camera: memory.to_json() for camera, memory in found.memories.items()},
-    )
+        )
+    steadied = _steadied(venue, found)
+    with job.drawing(found.timings):
+        pictures, later = _draw(job, found, options, steadied)
+    remembered = memories if options.dry_run else {**memories, **found.memories}
+    result = _result(job, venue, options, found, steadied, remembered, nights)
+    accepted_memories = {camera: memory.to_json() for camera, memory in found.memories.items()}
+    return Solution(_refused_in_part(venue, options, result), pictures, later, accepted_memories)
 
 
-def _drawn(venue: Venue, given: EngineInputs, found: engine.Calibration, options: Options) -> JobPictures:
-    """What only this job can draw; and all the rest at once where somebody asks for it, or will want to see why."""
-    seen = masks(given.cameras, found.responses)
+def _draw(
+    job: FramesJob, found: engine.Calibration, options: Options, lights: Mapping[str, Light]
+) -> tuple[dict[str, bytes], Sequence[str]]:
+    """Return the pictures that only this job can draw, and the names of those that are drawn when somebody looks.
+
+    All are drawn at once where `options` say so, or where a camera was rejected: somebody will want to see why.
+    """
+    seen = masks(job.cameras, found.responses)
     if found.accepted and not options.pictures:
-        return JobPictures(seen, names_of_all([camera.id for camera in given.cameras]))
+        return seen, names_of_all([camera.id for camera in job.cameras])
     # Most jobs draw nothing.
     from worker.jobs.pictures import PictureInputs, draw
 
     scene = PictureInputs(
-        (given.pitch, given.cameras),
+        (job.pitch, job.cameras),
         (found.pitch, [result.camera for result in found.cameras]),
-        {camera: several[0] for camera, several in given.frames.items()},
+        {camera: several[0] for camera, several in job.frames.items()},
         {result.camera.id: result.markings for result in found.cameras},
-        _steadied(venue, found),
+        lights,
     )
-    return JobPictures(draw(scene, scene.names) | seen)
+    return draw(scene, scene.names) | seen, ()
 
 
 def _steadied(venue: Venue, found: engine.Calibration) -> dict[str, Light]:
-    """The light of the cameras that were evened out, steadied by what the venue keeps of it."""
-    kept = {camera: light_of(light) for camera, light in venue.lights.items()}
+    """Return the photometric corrections that were found, steadied by those that the venue keeps."""
+    kept = {camera.id: light_of(camera.light) for camera in venue.cameras if camera.light is not None}
     return {camera: light.after(kept.get(camera)) for camera, light in found.lights.items()}
 
 
@@ -136,58 +144,56 @@ def _method(options: Options) -> Callable[..., engine.Calibration]:
 def _engine_options(venue: Venue, options: Options) -> engine.Options:
     shared = {field.name for field in fields(engine.Options)}
     return engine.Options(
-        **{name: value for name, value in vars(options).items() if name in shared and value is not None},
+        **{name: value for name, value in dict(options).items() if name in shared and value is not None},
         lens_may_drift=venue.lens == "may-drift",
         recover=venue.recover,
     )
 
 
 def _result(
+    job: FramesJob,
     venue: Venue,
-    found: engine.Calibration,
     options: Options,
-    spent: engine.StageTimings,
-    provenance: Provenance,
-    warnings: Sequence[str],
+    found: engine.Calibration,
+    lights: Mapping[str, Light],
     memories: Mapping[str, CameraMemory],
     nights: NightHistory,
 ) -> Result:
-    remembered = memories if options.dry_run else {**memories, **found.memories}
     ridge = found.pitch.ridge
-    lights = {camera: light_to_schema(light) for camera, light in _steadied(venue, found).items()}
+
+    def camera_result(camera: quality.CameraResult) -> CameraResult:
+        name, lens = camera.camera.id, camera.camera.intrinsics
+        return camera_to_schema(camera).model_copy(
+            update={
+                "intrinsics": lens_to_schema(lens) if options.fit_focal_length or camera.lens_found else None,
+                "light": light_to_schema(lights[name]) if name in lights else None,
+                "displacement": displacement_to_schema(found.pitch, camera, nights.anchors.get(name)),
+                "refined": refined_to_schema(found.pitch, camera),
+                "lens_change": lens_change_to_schema(camera, nights.taken_at),
+                "nights": _nights(found.pitch, memories.get(name)),
+                "seen_by_network": "full" if name in found.in_full else "overview",
+            }
+        )
+
     return Result(
         verdict=found.verdict,
         accepted=found.accepted,
         rejected_because=found.rejected_because,
-        cameras=[
-            {
-                **camera_to_schema(
-                    camera,
-                    lens_to_schema(camera.camera.intrinsics) if options.fit_focal_length or camera.lens_found else None,
-                    lights.get(camera.camera.id),
-                    displacement_to_schema(found.pitch, camera, nights.anchors.get(camera.camera.id)),
-                ),
-                "refined": refined_to_schema(found.pitch, camera),
-                "lens_change": lens_change_to_schema(camera, nights.taken_at),
-                "nights": _nights(found.pitch, remembered.get(camera.camera.id)),
-                "seen_by_network": "full" if camera.camera.id in found.in_full else "overview",
-            }
-            for camera in found.cameras
-        ],
+        cameras=[camera_result(camera) for camera in found.cameras],
         ridge=ridge.tolist() if options.fit_ridge and ridge is not None else None,
         diagnosis=[_suspicion(one) for one in found.suspicions],
         adoptable=_adoptable(venue, found),
-        warnings=[*venue.lens_warnings, *warnings],
+        warnings=[*(words for camera in venue.cameras for words in lens_warnings(camera)), *job.remarks],
         stitch_error_px=finite_or_none(found.stitch_error_px),
         stitch_error_before_px=finite_or_none(found.stitch_error_before_px),
-        stitch_error_limit_px=Gate().largest_stitch_error_px,
+        stitch_error_limit_px=quality.Gate().largest_stitch_error_px,
         pairs=[pair_to_schema(*pair) for pair in found.pairs],
         loss=finite_or_none(found.loss),
         generations=found.generations,
         path=found.path,
-        timings_s=round_to_ms(spent.seconds),
-        cpu_s=round_to_ms(spent.core_seconds),
-        provenance=provenance,
+        timings_s=round_to_ms(job.spent.seconds),
+        cpu_s=round_to_ms(job.spent.core_seconds),
+        provenance=job.provenance,
     )
 
 
@@ -196,9 +202,9 @@ def _suspicion(of: diagnosis.Suspicion) -> Suspicion:
 
 
 def _adoptable(venue: Venue, found: engine.Calibration) -> list[AdoptableNumber]:
-    """The numbers of the field that the lines contradict, in millimetres, which are finer than any sigma.
+    """Return the numbers of the field that the lines contradict, in millimetres, which are finer than any sigma.
 
-    None where a venue with a ridge was calibrated as if it were flat: they are numbers of another field.
+    There are none where a venue with a ridge was calibrated as if it were flat: they are numbers of another field.
     """
     of_field = [one for one in found.suspicions if one.camera is None]
     if not of_field or (found.pitch.ridge is None and venue.field.ridge is not None):
@@ -219,26 +225,17 @@ def _adoptable(venue: Venue, found: engine.Calibration) -> list[AdoptableNumber]
 
 
 def _nights(pitch: Field, memory: CameraMemory | None) -> int:
-    """How many jobs a memory is of; one of another field is none."""
+    """Return the number of jobs in a memory, 0 if it is of another field."""
     (fits,) = memories_of_field([memory], pitch.line_points())
     return 0 if fits is None else fits.jobs
 
 
-def _allowed(venue: Venue, options: Options, result: Result) -> Result:
-    """What of it may hold: poses that belong together only together."""
-    if result["verdict"] != "partly":
+def _refused_in_part(venue: Venue, options: Options, result: Result) -> Result:
+    """Return the result, refused if only part of it was accepted and its poses may only be stored together."""
+    if result.verdict != "partly":
         return result
     if venue.accept == "all":
-        return _refused(result, "the venue accepts the poses of all cameras or none")
+        return refuse(result, "the venue accepts the poses of all cameras or none")
     if options.fit_ridge:
-        return _refused(result, "a ridge is accepted with the poses of all cameras or not at all")
+        return refuse(result, "a ridge is accepted with the poses of all cameras or not at all")
     return result
-
-
-def _refused(result: Result, because: str) -> Result:
-    """The result with every pose refused."""
-    cameras: list[CameraResult] = [
-        {**camera, **refuse_camera(camera["rejected_because"], camera["refusal"], because, "all-or-none")}
-        for camera in result["cameras"]
-    ]
-    return {**result, **refuse_result(result["rejected_because"], because), "cameras": cameras}

@@ -19,7 +19,7 @@ BIT_DEPTH_AT = 24
 LARGEST_ARRAY = 1 << 40
 """Bytes, more than any machine has; what a damaged header says may be beyond what NumPy counts with."""
 SENSOR_BITS = (10, 12, 14)
-"""Of the sensors whose values are written into files of 16 bits as they are, in their dark end."""
+"""Depths of sensors whose values are written as they are into the dark end of files of 16 bits."""
 
 
 def no_remark(_: str) -> None:

@@ -10,12 +10,10 @@ from service.schemas.options import FieldOptions
 from service.schemas.results import FieldResult, MeasureResult
 from service.schemas.venue import Venue
 from worker.calibration.field_fit.measures import FieldFit, Measure, fit_field
-from worker.calibration.records import StageTimings
 from worker.calibration.rendering.overlays import overlay
 from worker.compute_resources import ComputeResources
-from worker.jobs import frames_job
-from worker.jobs.answers import Progress, Provenance
-from worker.jobs.frames_job import EngineInputs, JobPictures
+from worker.jobs.documents import Progress
+from worker.jobs.frames_job import FramesJob
 from worker.jobs.from_schemas import encode_jpeg
 from worker.jobs.to_schemas import MILLIMETRE, Solution, camera_to_schema, finite_or_none, ridge_to_schema, round_to_ms
 
@@ -29,37 +27,29 @@ def solve(
     means: ComputeResources,
     report: Callable[[Progress], None],
 ) -> Solution[FieldResult]:
-    """The measures of a venue's pitch from the files of its cameras."""
-    seed = options.seed or 0
-    return frames_job.solve(
-        venue,
-        files,
-        # Who is told changes no number, and the address may be a secret.
-        options.model_dump(mode="json", exclude={"callback_url"}),
-        means,
-        report,
-        lambda given, step: fit_field(given.pitch, given.cameras, given.frames, given.network, seed, step),
-        _draw,
-        lambda found, spent, provenance, warnings: _result(venue.field, found, spent, provenance, warnings),
-    )
+    """Fit the measures of a venue's pitch to the files of its cameras."""
+    job = FramesJob.prepare(venue, files, options, means, report)
+    with job.engine() as step:
+        found = fit_field(job.pitch, job.cameras, job.frames, job.network, options.seed or 0, step)
+    with job.drawing(found.timings):
+        pictures = _draw(job, found)
+    return Solution(_result(job, venue.field, found), pictures)
 
 
-def _draw(given: EngineInputs, found: FieldFit) -> JobPictures:
+def _draw(job: FramesJob, found: FieldFit) -> dict[str, bytes]:
     pictures = {}
-    for old, new in zip(given.cameras, found.cameras, strict=True):
+    for old, new in zip(job.cameras, found.cameras, strict=True):
         try:
-            both = (given.pitch, old), (found.pitch, new.camera)
-            drawn = overlay(*both, given.frames[old.id][0], "field", new.markings)
+            both = (job.pitch, old), (found.pitch, new.camera)
+            drawn = overlay(*both, job.frames[old.id][0], "field", new.markings)
         except Exception:  # what was rejected may look anywhere; a picture is not worth losing the reason
             log.warning("cannot draw camera %s", old.id, exc_info=True)
             continue
         pictures[f"overlay_{old.id}"] = encode_jpeg(drawn)
-    return JobPictures(pictures)
+    return pictures
 
 
-def _result(
-    given: FieldOfPlay, found: FieldFit, spent: StageTimings, provenance: Provenance, warnings: Sequence[str]
-) -> FieldResult:
+def _result(job: FramesJob, given: FieldOfPlay, found: FieldFit) -> FieldResult:
     return FieldResult(
         accepted=found.accepted,
         rejected_because=found.rejected_because,
@@ -67,15 +57,15 @@ def _result(
         measures=[_measure_to_schema(measure) for measure in found.measures],
         cameras=[camera_to_schema(camera) for camera in found.cameras],
         stitch_error_px=finite_or_none(found.stitch_error_px),
-        warnings=list(warnings),
-        timings_s=round_to_ms(spent.seconds),
-        cpu_s=round_to_ms(spent.core_seconds),
-        provenance=provenance,
+        warnings=list(job.remarks),
+        timings_s=round_to_ms(job.spent.seconds),
+        cpu_s=round_to_ms(job.spent.core_seconds),
+        provenance=job.provenance,
     )
 
 
 def _field_to_schema(given: FieldOfPlay, found: FieldFit) -> FieldOfPlay:
-    """The fitted pitch in millimetres, which are finer than any of its sigmas."""
+    """Return the fitted pitch in millimetres, which are finer than any of its sigmas."""
     pitch = found.pitch
     size = {"length_m": round(pitch.length, MILLIMETRE), "width_m": round(pitch.width, MILLIMETRE)}
     return given.changed({**size, "ridge": ridge_to_schema(pitch)})

@@ -31,8 +31,8 @@ from worker.calibration.relocalisation.sought import (
 )
 from worker.calibration.rendering.overlays import candidate_picture
 from worker.compute_resources import ComputeResources
-from worker.jobs.answers import Progress, Provenance
 from worker.jobs.decoding import decode_frame, decode_frame_of_any_size
+from worker.jobs.documents import Progress, Provenance
 from worker.jobs.from_schemas import (
     Picture,
     camera_of,
@@ -148,19 +148,19 @@ def _result(
     site: SoughtSite,
     sought: Sequence[SoughtCamera],
     provenance: Provenance,
-    of_frames: Mapping[str, Iterable[str]],
+    frame_remarks: Mapping[str, Iterable[str]],
 ) -> FindResult:
     doubts = {
         camera.id: lens_doubts(camera.intrinsics, camera.image_size)
         for camera in site.cameras
         if camera.intrinsics is not None and camera.image_size is not None
     }
-    remarks = {one.id: [*doubts.get(one.id, []), *dict.fromkeys(of_frames[one.id])] for one in sought}
+    remarks = {one.id: [*doubts.get(one.id, []), *dict.fromkeys(frame_remarks[one.id])] for one in sought}
     refusals = [f"camera {one.id}: {one.refusal.words}" for one in found.cameras if one.refusal is not None]
     return FindResult(
         accepted=not refusals,
         rejected_because="; ".join(refusals) or None,
-        cameras=[_camera(one, its.size, remarks[one.id]) for one, its in zip(found.cameras, sought, strict=True)],
+        cameras=[_camera(one, camera.size, remarks[one.id]) for one, camera in zip(found.cameras, sought, strict=True)],
         ridge=ridge_to_schema(found.pitch) if given.ridge is None else None,
         stitch_error_px=finite_or_none(found.stitch_error_px),
         timings_s=round_to_ms(found.timings.seconds),

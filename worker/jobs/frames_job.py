@@ -1,11 +1,12 @@
-"""What the kinds of jobs share that begin with the frames of a venue: decode, compute, draw, tell."""
+"""Jobs on the frames of a venue, of the kinds `calibration` and `field`: the inputs and the course that they share."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING
 
 import cv2
 
@@ -13,15 +14,13 @@ from worker.calibration import records
 from worker.calibration.detection.segmentation import Segmenter
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.field import Field
-from worker.calibration.records import EngineResult, StageTimings
+from worker.calibration.records import StageTimings
 from worker.compute_resources import ComputeResources
-from worker.jobs.answers import Progress, Provenance
 from worker.jobs.decoding import decode_frame
+from worker.jobs.documents import Progress, Provenance
 from worker.jobs.from_schemas import Picture, camera_with_ignored_areas, pitch_of
 from worker.jobs.to_schemas import (
     PREVIEW_FRACTION,
-    R,
-    Solution,
     engine_failures,
     load_segmenter,
     progress_to_schema,
@@ -29,73 +28,71 @@ from worker.jobs.to_schemas import (
 )
 
 if TYPE_CHECKING:
+    from service.schemas.options import FieldOptions, Options
     from service.schemas.venue import Camera as VenueCamera
     from service.schemas.venue import Venue
-    from worker.jobs import inputs
 
-A = TypeVar("A", bound=EngineResult)
 Frames = Mapping[str, Sequence[Picture]]
 
 
 @dataclass(frozen=True)
-class EngineInputs:
-    """What the engine is given: the pitch, the cameras at their stored poses, their decoded frames, and the network."""
+class FramesJob:
+    """The engine's inputs in a job on the frames of a venue, and what its result says of how it was computed.
+
+    `cameras`: at their stored poses; `frames`: decoded, by camera; `remarks`: what was changed in them, in words;
+    `spent`: the time of the stages so far. Use it with or without a server around it.
+    """
 
     pitch: Field
     cameras: Sequence[Camera]
     frames: Frames
+    remarks: Sequence[str]
     network: Segmenter
+    provenance: Provenance
+    spent: StageTimings
+    report: Callable[[Progress], None]
+
+    @classmethod
+    def prepare(
+        cls,
+        venue: Venue,
+        files: Mapping[str, Sequence[bytes]],
+        options: Options | FieldOptions,
+        means: ComputeResources,
+        report: Callable[[Progress], None],
+    ) -> FramesJob:
+        """Load the network and decode the `files` of each camera; raises `JobFailedError`."""
+        segmenter = load_segmenter(means)
+        cv2.setNumThreads(means.threads)
+        spent = StageTimings()
+        with spent.timed("decode"):
+            frames, remarks = _decode(venue, files, means.threads)
+        cameras = [camera_with_ignored_areas(camera, camera.ignore) for camera in venue.cameras]
+        # The address of a callback changes no number, and may be a secret.
+        chosen = options.model_dump(mode="json", exclude={"callback_url"})
+        provenance = provenance_of(means, segmenter, options.seed or 0, chosen)
+        return cls(pitch_of(venue.field), cameras, frames, remarks, segmenter, provenance, spent, report)
+
+    @contextmanager
+    def engine(self) -> Iterator[Callable[[records.Progress], None]]:
+        """Run the engine in the block: yields its progress callback, raises its failures as `JobFailedError`."""
+        with engine_failures():
+            yield lambda step: self.report(progress_to_schema(step))
+
+    @contextmanager
+    def drawing(self, timings: StageTimings) -> Iterator[None]:
+        """Draw the pictures in the block, after an engine that took `timings`."""
+        self.report(Progress(stage="preview", fraction=PREVIEW_FRACTION))
+        self.spent.add(timings)
+        with self.spent.timed("preview"):
+            yield
 
 
-@dataclass(frozen=True)
-class JobPictures:
-    """Pictures by name, and the names of those that can be drawn later."""
-
-    pictures: dict[str, bytes]
-    later: Sequence[str] = ()
-
-
-def solve(
-    venue: Venue | inputs.Venue,
-    files: Mapping[str, Sequence[bytes]],
-    options: dict[str, Any],
-    means: ComputeResources,
-    report: Callable[[Progress], None],
-    engine: Callable[[EngineInputs, Callable[[records.Progress], None]], A],
-    draw: Callable[[EngineInputs, A], JobPictures],
-    tell: Callable[[A, StageTimings, Provenance, Sequence[str]], R],
-    remember: Callable[[A], Mapping[str, dict[str, Any]]] = lambda _: {},
-) -> Solution[R]:
-    """Call the `engine` with what a venue and the files of its cameras hold, `draw` its answer and `tell` it.
-
-    `options`: what was asked for, to be told of with the result, `seed` among it. What is told, too, is what had to be
-    changed in frames. `remember`: the memories that the answer leaves, by camera. With or without a server around it.
-    """
-    segmenter = load_segmenter(means)
-    cv2.setNumThreads(means.threads)
-    spent = StageTimings()
-    with spent.timed("decode"):
-        frames, warnings = _decode(venue, files, means.threads)
-    cameras = [camera_with_ignored_areas(camera, camera.ignore) for camera in venue.cameras]
-    given = EngineInputs(pitch_of(venue.field), cameras, frames, segmenter)
-    with engine_failures():
-        answer = engine(given, lambda step: report(progress_to_schema(step)))
-    report(Progress(stage="preview", fraction=PREVIEW_FRACTION))
-    spent.add(answer.timings)
-    with spent.timed("preview"):
-        drawn = draw(given, answer)
-    provenance = provenance_of(means, segmenter, options.get("seed") or 0, options)
-    result = tell(answer, spent, provenance, warnings)
-    return Solution(result, drawn.pictures, drawn.later, remember(answer))
-
-
-def _decode(
-    venue: Venue | inputs.Venue, files: Mapping[str, Sequence[bytes]], threads: int
-) -> tuple[Frames, Sequence[str]]:
-    """The frames of each camera, several at once: one is decoded on one core. And what is to be told of them, once."""
+def _decode(venue: Venue, files: Mapping[str, Sequence[bytes]], threads: int) -> tuple[Frames, Sequence[str]]:
+    """Return the frames of each camera and the remarks on them, each once; every file is decoded on one core."""
     remarks: list[str] = []
 
-    def decode(camera: VenueCamera | inputs.Camera, file: bytes) -> Picture:
+    def decode(camera: VenueCamera, file: bytes) -> Picture:
         return decode_frame(camera.id, camera.image_size, file, remarks.append)
 
     with ThreadPoolExecutor(threads) as pool:

@@ -1,7 +1,4 @@
-"""What a job or a drawing is given, as the engine takes it: the wire's types become the engine's.
-
-The wire's models and the plain records that are parts of them (`worker.jobs.inputs`) are read alike.
-"""
+"""Conversion of the wire's models, and of documents of `worker.jobs.documents`, to the types of the engine."""
 
 from __future__ import annotations
 
@@ -13,6 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from fields.plans import other_shapes, plan_of, size_of
 from service.schemas.names import problem_uri
 from worker.calibration.geometry.camera import Camera, Pose
 from worker.calibration.geometry.field import Field
@@ -20,16 +18,12 @@ from worker.calibration.geometry.ignored_areas import Ignored
 from worker.calibration.geometry.lens import LENSES, Lens
 from worker.calibration.stitching.photometry import Light
 from worker.calibration.stitching.views import ViewChoice
+from worker.jobs.documents import JobError
 
 if TYPE_CHECKING:
-    from service.schemas import field, geometry, view
-    from worker.jobs import inputs
-    from worker.jobs.answers import JobError
-
-    FieldOfPlay = field.FieldOfPlay | inputs.FieldOfPlay
-    Intrinsics = geometry.Intrinsics | inputs.Intrinsics
-    PosedCamera = geometry.PosedCamera | inputs.PosedCamera
-    GivenLight = geometry.Light | inputs.Light
+    from service.schemas import geometry, view
+    from service.schemas.field import FieldOfPlay
+    from service.schemas.geometry import Intrinsics, PosedCamera
 
 Picture = NDArray[np.uint8]
 JPEG_QUALITY = 90
@@ -44,74 +38,77 @@ class JobFailedError(Exception):
 
     @property
     def error(self) -> JobError:
-        """For the row of the job."""
+        """The error of the job, for the wire."""
         # Nearly all jobs end without.
         from service.schemas.problems import PROBLEM_TYPES
 
-        return {
-            "type": problem_uri(self.kind),
-            "title": PROBLEM_TYPES[self.kind].title,
-            "detail": self._detail,
-            "camera": self._camera,
-        }
+        return JobError(
+            type=problem_uri(self.kind),
+            title=PROBLEM_TYPES[self.kind].title,
+            detail=self._detail,
+            camera=self._camera,
+        )
 
     def because(self, why: str) -> JobFailedError:
-        """The same, with its likeliest cause."""
+        """Return the error with its likeliest cause added."""
         return JobFailedError(self.kind, f"{self._detail} {why[0].upper()}{why[1:]}.", self._camera)
 
 
 def encode_jpeg(picture: Picture, quality: int = JPEG_QUALITY) -> bytes:
-    """The file of a picture."""
+    """Return the JPEG file of a BGR or grey picture."""
     _, data = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, quality])
     return data.tobytes()
 
 
 def encode_png(picture: Picture) -> bytes:
-    """The file of a picture with an opacity, BGRA."""
+    """Return the PNG file of a picture, with its opacity if it is BGRA."""
     _, data = cv2.imencode(".png", picture)
     return data.tobytes()
 
 
 def pitch_of(field: FieldOfPlay) -> Field:
-    """The engine's pitch."""
+    """Return the engine's pitch."""
+    template = field.template if isinstance(field.template, str) else field.template.model_dump()
+    others = other_shapes([other.model_dump() for other in field.other_markings], size_of(dict(field)))
     ridge = None if field.ridge is None else np.array(field.ridge)
     size = field.length_m, field.width_m, field.line_width_m
     sigma: dict[str, float] = dict(field.sigma.items())
-    return Field(*size, ridge, field.plan, field.measures_m, others=field.others, sigma=sigma)
+    plan = plan_of(template, field.uneven_m)
+    return Field(*size, ridge, plan, field.measures_m, others=others, sigma=sigma)
 
 
 def lens_of(lens: Intrinsics, image_size: list[int]) -> Lens:
-    """The engine's lens."""
+    """Return the engine's lens."""
     matrix, distortion = np.array(lens.matrix, dtype=float), np.array(lens.distortion, dtype=float)
     size = image_size[0], image_size[1]
     return LENSES[lens.model](matrix, distortion, size, dict(lens.sigma or {}), lens.sigma_from)
 
 
 def camera_of(camera: PosedCamera) -> Camera:
-    """The engine's camera at its stored pose."""
+    """Return the engine's camera at its stored pose."""
     pose = Pose(np.array(camera.pose.rotation), np.array(camera.pose.position))
     return Camera(camera.id, lens_of(camera.intrinsics, camera.image_size), pose)
 
 
 def choice_of(choice: view.ViewChoice) -> ViewChoice:
-    """What a stitched view shows, for the engine."""
+    """Return the engine's choice of a stitched view."""
     size = choice.width_px, choice.height_px
     return ViewChoice(choice.projection, *size, choice.field_of_view_deg, choice.pan_deg, choice.horizon)
 
 
-def light_of(light: GivenLight) -> Light:
-    """How a camera's picture is evened out, for the engine: colours from blue to red."""
+def light_of(light: geometry.Light) -> Light:
+    """Return the engine's photometric correction of a camera, its colours from blue to red."""
     red, green, blue = light.gain
     return Light((blue, green, red), light.contrast, light.falloff, light.reach)
 
 
 def camera_with_ignored_areas(camera: PosedCamera, ignore: Sequence[Sequence[Sequence[float]]]) -> Camera:
-    """The engine's camera, with the polygons of its frames that are to be ignored."""
+    """Return the engine's camera with the polygons of its frames that are to be ignored."""
     return replace(camera_of(camera), ignored=ignored_areas_of(ignore, camera.image_size))
 
 
 def ignored_areas_of(ignore: Sequence[Sequence[Sequence[float]]], image_size: Sequence[int]) -> Ignored | None:
-    """The polygons of a camera's frames that are to be ignored, for the engine; None without any."""
+    """Return the engine's areas of a camera's frames that are to be ignored, or None without any."""
     width, height = image_size
     polygons = [np.array(polygon, dtype=float) for polygon in ignore]
     return Ignored(polygons, (width, height)) if polygons else None

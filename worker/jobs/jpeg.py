@@ -23,8 +23,8 @@ END = b"\xff\xd9"
 PADDING = b"\0\r\n"
 """Bytes before the end of the picture that are none of it: hardware fills its memory, others end a line."""
 ODDITY = re.compile(r"unknown JFIF|Unknown Adobe|ICC|Invalid SOS parameters|determine subsampling")
-"""Of libjpeg's messages (jerror.h) those that are not about pixels, and the one of files that simplejpeg cannot read
-and OpenCV can. Of all others OpenCV makes the part of a picture that came before."""
+"""Messages of libjpeg (jerror.h) that are not about pixels, and the one for files that OpenCV reads and simplejpeg does
+not. After any other message OpenCV shows only the part of the picture before the damage."""
 BLOCKS = {
     "Gray": (8, 8),
     "444": (8, 8),
@@ -38,8 +38,8 @@ BLOCKS = {
 STEP = 8
 """Grey levels that a step at the edge of blocks has to exceed: a quarter of what changes a picture visibly."""
 STEP_SHARE = 0.7
-"""Of the blocks along one row's length: as many more have a step than of those beside it in the same two rows. Of 120
-real pictures of fields one comes to 0.62 (a board along its upper edge), and the next to 0.41."""
+"""Least share of the blocks along one row's length by which steps are more frequent than beside it, in the same two
+rows. Of 120 real pictures of fields one comes to 0.62 (a board along its upper edge), and the next to 0.41."""
 
 
 class DamagedPictureError(Exception):

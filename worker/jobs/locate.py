@@ -25,8 +25,8 @@ from worker.calibration.onboarding.first_pose import first_pose
 from worker.calibration.onboarding.first_pose_verdict import FirstPose
 from worker.calibration.onboarding.freed_lens import LensGain
 from worker.calibration.rendering.inspection import clicks_picture
-from worker.jobs.answers import Progress
 from worker.jobs.decoding import decode_frame_of_any_size
+from worker.jobs.documents import Progress
 from worker.jobs.from_schemas import JobFailedError, Picture, encode_jpeg, lens_of, pitch_of
 from worker.jobs.to_schemas import Solution, finite_or_none, lens_to_schema, pose_to_schema, round_to_ms
 

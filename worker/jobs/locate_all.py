@@ -2,7 +2,7 @@
 
 Points clicked in the picture of another camera fit some pose, with the lens made to fit. The lenses show it where they
 differ: a camera whose points refute its own lens and hold with another's, and the other way round. Cameras with lenses
-alike are told apart by nothing here; of them only stored poses tell (`worker.jobs.locate`).
+alike cannot be told apart here, only by stored poses (`worker.jobs.locate`).
 """
 
 from __future__ import annotations
@@ -47,12 +47,12 @@ def locate_all(
         crossed = _rms_px(field, one, points, lenses[other]), _rms_px(field, other, points, lenses[one])
         if None not in crossed:
             words = {name: _misfit(ended[name]) for name in (one, other)}
-            told = (
+            explanation = (
                 f"the points of {one} fit the lens of {other} ({crossed[0]:.1f} px rms) and not their own "
                 f"({words[one]}), and those of {other} the lens of {one} ({crossed[1]:.1f} px rms) and not their own "
                 f"({words[other]}): the points of the two cameras are exchanged, or else their lenses"
             )
-            ended |= {name: _refused(ended[name], told) for name in (one, other)}
+            ended |= {name: _refused(ended[name], explanation) for name in (one, other)}
     return {camera: _compared(camera, end, lenses) for camera, end in ended.items()}
 
 
@@ -76,7 +76,7 @@ def _compared(
 
 
 def _misfit(end: Solution[LocateResult] | JobFailedError) -> str | None:
-    """How badly points and lens of a camera fit each other, in words; None where nothing speaks against them."""
+    """Return in words how badly points and lens of a camera fit each other, or None if they fit."""
     if isinstance(end, JobFailedError):
         return "no pose" if end.kind == "no-pose" else None
     result = end.result
@@ -89,7 +89,7 @@ def _misfit(end: Solution[LocateResult] | JobFailedError) -> str | None:
 
 
 def _rms_px(field: FieldOfPlay, camera: str, points: Mapping[str, list[ClickedPoint]], lens: Lens) -> float | None:
-    """How well a camera's points fit a lens as it is; None where they do not."""
+    """Return the rms of a camera's points with a lens as it is, or None if they do not fit it."""
     pitch = pitch_of(field)
     try:
         found = first_pose(clicks_of(camera, pitch, points[camera]), lens, pitch.places(), camera)

@@ -1,4 +1,4 @@
-"""What earlier nights say of a camera, for the wire: its refined pose and lens, and how its focal length has changed.
+"""Members of a result that earlier nights contribute: refined pose and lens, and change of the focal length.
 
 The pose of a result belongs to the lens that the venue has. The refined one belongs to the lens as the lines have it,
 those of tonight and those of the camera's memory together.
@@ -23,18 +23,18 @@ from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.lens import SIGMA_NAMES
 from worker.calibration.memory.camera_memory import CameraMemory
 from worker.calibration.refinement import uncertainty
-from worker.jobs.answers import LensChange, Refined
+from worker.jobs.documents import LensChange, Refined
 from worker.jobs.to_schemas import lens_to_schema, pose_to_schema, sigma_to_schema
 
 
-def read_memories(told: Mapping[str, Mapping[str, Any]]) -> dict[str, CameraMemory]:
-    """The memories of cameras, as the engine takes them, but for those that another release wrote otherwise."""
-    read = {camera: CameraMemory.from_json(memory) for camera, memory in told.items()}
+def read_memories(documents: Mapping[str, Mapping[str, Any]]) -> dict[str, CameraMemory]:
+    """Return the engine's memories of cameras, without those that another release wrote in another format."""
+    read = {camera: CameraMemory.from_json(memory) for camera, memory in documents.items()}
     return {camera: memory for camera, memory in read.items() if memory is not None}
 
 
 def refined_to_schema(pitch: Field, found: CameraResult) -> Refined | None:
-    """The refined pose and lens of a camera beside its answer; None where it has none."""
+    """Return the refined pose and lens of a camera, or None if it has none."""
     refined = found.refined
     if refined is None or not _is_a_camera(refined.camera):
         return None
@@ -42,7 +42,7 @@ def refined_to_schema(pitch: Field, found: CameraResult) -> Refined | None:
     covariance = refined.covariance if np.isfinite(refined.covariance).all() else None
     return Refined(
         pose=pose_to_schema(refined.camera.pose),
-        intrinsics={**lens_to_schema(refined.camera.intrinsics), "sigma": _lens_sigma(covariance)},
+        intrinsics=lens_to_schema(refined.camera.intrinsics).model_copy(update={"sigma": _lens_sigma(covariance)}),
         covariance=None if covariance is None else covariance.tolist(),
         sigma=sigma_to_schema(refined.sigma),
         longer=focal_refined / focal - 1,
@@ -51,7 +51,7 @@ def refined_to_schema(pitch: Field, found: CameraResult) -> Refined | None:
 
 
 def _is_a_camera(camera: Camera) -> bool:
-    """Whether this can be a camera: lines that determine next to nothing can end far outside of all lenses."""
+    """Return False for numbers that no lens has: lines that determine next to nothing can end there."""
     lens = camera.intrinsics
     numbers = np.concatenate([camera.pose.rotation, camera.pose.position, lens.matrix.ravel(), lens.distortion])
     focal = np.diag(lens.matrix)[:2]
@@ -70,7 +70,7 @@ def _lens_sigma(covariance: Array | None) -> dict[str, float] | None:
 
 
 def lens_change_to_schema(found: CameraResult, tonight: datetime | None) -> LensChange | None:
-    """How much longer a focal length is than in the first nights of a memory; None where there is no memory."""
+    """Return the change of the focal length since the first nights of a memory, or None without a memory."""
     change = found.lens_change
     if change is None or not math.isfinite(change.sigma) or not math.isfinite(change.longer):
         return None
@@ -96,6 +96,6 @@ def lens_change_in_words(change: uncertainty.LensChange, tonight: datetime | Non
 
 
 def _day(moment: datetime, tonight: datetime | None) -> str:
-    """A day without its year, unless that is another one."""
+    """Return a day in words, with its year only if that is not tonight's."""
     day = f"{moment.day} {moment:%B}"
     return day if tonight is not None and tonight.year == moment.year else f"{day} {moment.year}"

@@ -1,4 +1,4 @@
-"""The pictures of a calibration: what a person looks at before he trusts it."""
+"""The pictures of a calibration, by which a person judges it."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class PictureInputs:
-    """What is drawn: a pitch and cameras as they were `stored` and as they were `found`, and a frame of each camera.
+    """Inputs of the pictures: pitch and cameras as `stored` and as `found`, and a frame of each camera.
 
-    `markings`: what is said of them, by the camera that sees them. `lights`: how cameras are evened out.
+    `markings`: reports on them, by the camera that sees them. `lights`: photometric corrections by camera.
     """
 
     stored: tuple[Field, Sequence[Camera]]
@@ -42,12 +42,12 @@ class PictureInputs:
 
     @property
     def names(self) -> list[str]:
-        """All pictures that can be drawn."""
+        """Names of all pictures that can be drawn."""
         return names_of_all([camera.id for camera in self.stored[1]])
 
 
 def draw(scene: PictureInputs, names: Sequence[str]) -> dict[str, bytes]:
-    """Files by name, those that are drawn together with the ones that are asked for too."""
+    """Draw pictures; return the files by name, with those that are drawn together with the wanted ones."""
     parts: list[Callable[[], dict[str, bytes]]] = []
     if {*names} & {*STITCHED}:
         parts.append(partial(_stitched, scene))
@@ -66,7 +66,7 @@ def draw(scene: PictureInputs, names: Sequence[str]) -> dict[str, bytes]:
 
 
 def _stitched(scene: PictureInputs) -> dict[str, bytes]:
-    """One view by the new poses, where one camera hands over to another in it, and the view by the stored poses."""
+    """Draw the stitched view by the new poses, its seams, and the view by the stored poses."""
     view = chosen_view(*scene.found, ViewChoice(width=PREVIEW_WIDTH))
     # Somebody may wait, and each of them keeps a core busy.
     with ThreadPoolExecutor(2) as both:
@@ -86,7 +86,7 @@ def _birdseye(scene: PictureInputs) -> dict[str, bytes]:
 
 
 def _of_camera(scene: PictureInputs, number: int) -> dict[str, bytes]:
-    """The frame with both fields on it and what is wrong with markings; and smaller, with what is laid over it."""
+    """Draw a frame with both fields and faults of markings on it, and a smaller one with its layers."""
     stored, new = ((pitch, cameras[number]) for pitch, cameras in (scene.stored, scene.found))
     camera, size = stored[1].id, size_as_shown(stored[1])
     frame = scene.frames[camera]

@@ -18,20 +18,21 @@ import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any, cast
 
 import cv2
 import numpy as np
 
 from service import child_process
 from worker.compute_resources import ComputeResources
-from worker.jobs.answers import Progress
+from worker.jobs.documents import Document, Progress, parse, parse_task
 from worker.jobs.from_schemas import JobFailedError
 from worker.jobs.to_schemas import Solution
 
 if TYPE_CHECKING:
     from service.schemas.find import SoughtSite
-    from service.schemas.options import FindOptions
+    from service.schemas.options import FindOptions, Options
+    from service.schemas.venue import Venue
     from service.store.jobs.task import Task
 
 BEHIND_THE_OTHERS = 10
@@ -51,26 +52,26 @@ def main() -> None:
         os.nice(BEHIND_CALIBRATIONS)
     means = ComputeResources(**request["means"] | {"model": Path(request["means"]["model"])})
     try:
-        solution = _compute(request["task"], files, means, lambda progress: parent.told({"progress": progress}))
+        solution = _compute(request["task"], files, means, lambda progress: parent.send({"progress": progress}))
     except JobFailedError as failure:
-        parent.told({"error": failure.error})
+        parent.send({"error": failure.error})
         return
     except Exception as error:
         if not _is_lack_of_memory(error):
             raise
-        parent.told({"error": _without_memory().error})
+        parent.send({"error": _without_memory().error})
         return
     last = {
-        "result": _document(solution.result),
+        "result": solution.result.model_dump(mode="json"),
         "pictures": {name: len(picture) for name, picture in solution.pictures.items()},
         "later": list(solution.later),
         "memories": dict(solution.memories),
     }
-    parent.told(last, *solution.pictures.values())
+    parent.send(last, *solution.pictures.values())
 
 
 def _is_lack_of_memory(error: Exception) -> bool:
-    """Whether something failed since no memory was left: NumPy, OpenCV and ONNX Runtime each say it in their way."""
+    """Return True for the errors by which NumPy, OpenCV and ONNX Runtime say that no memory was left."""
     if isinstance(error, MemoryError) or (isinstance(error, cv2.error) and error.code == cv2.Error.StsNoMem):
         return True
     return "bad_alloc" in str(error) or "allocate memory" in str(error)
@@ -83,31 +84,31 @@ def _without_memory() -> JobFailedError:
     return JobFailedError("job-crashed", detail)
 
 
-def read_request(stream: IO[bytes]) -> tuple[dict[str, Any], dict[str, list[bytes]]]:
-    """Read a request that `JobRequest.write` wrote, as JSON, and its files."""
-    request = json.loads(stream.readline())
+def read_request(stream: IO[bytes]) -> tuple[Document, dict[str, list[bytes]]]:
+    """Read a request that `JobRequest.write` wrote, as a document, and its files."""
+    request = parse(stream.readline())
     return request, {name: [stream.read(size) for size in several] for name, several in request["sizes"].items()}
 
 
 def _compute(
-    task: dict[str, Any],
+    task: Document,
     files: Mapping[str, Sequence[bytes]],
     means: ComputeResources,
     report: Callable[[Progress], None],
 ) -> Solution[Any]:
-    """What the kind of the job asks for; what other kinds need is not loaded."""
+    """Compute a job by its kind; modules of the other kinds are not loaded."""
     cv2.setNumThreads(means.threads)
     if task["kind"] != "calibration":
         return _compute_by_models(task, files, means, report)
-    from worker.jobs import calibration, inputs
+    from worker.jobs import calibration
 
-    given = inputs.read_record(inputs.Task, task)
+    given = parse_task(task)
     nights = calibration.NightHistory(given.last_views, given.memories, given.anchors, given.taken_at)
-    return calibration.solve(given.venue, files, given.options, means, report, nights)
+    return calibration.solve(cast("Venue", given.venue), files, cast("Options", given.options), means, report, nights)
 
 
 def _compute_by_models(
-    document: dict[str, Any],
+    document: Document,
     files: Mapping[str, Sequence[bytes]],
     means: ComputeResources,
     report: Callable[[Progress], None],
@@ -142,7 +143,7 @@ def _compute_by_models(
 
 
 def _site_of(task: Task, options: FindOptions, files: Mapping[str, Sequence[bytes]]) -> SoughtSite:
-    """The site whose cameras are to be found: the one that was sent, or the stored venue."""
+    """Return the site whose cameras are to be found: the one that was sent, or the stored venue."""
     from service.schemas.find import SoughtSite
 
     if task.site is not None:
@@ -151,19 +152,13 @@ def _site_of(task: Task, options: FindOptions, files: Mapping[str, Sequence[byte
     return SoughtSite.of(task.venue, options, files)
 
 
-def _document(result: Any) -> dict[str, Any]:
-    """A result as JSON has it, which is a model of the wire unless it is plain already."""
-    document: dict[str, Any] = result if isinstance(result, dict) else result.model_dump(mode="json")
-    return document
-
-
 def encode(message: Mapping[str, Any]) -> bytes:
     """The line of JSON of a message."""
     return json.dumps(_plain(message), ensure_ascii=False).encode()
 
 
 def _plain(value: Any) -> Any:
-    """A value without NumPy's scalars, and without what JSON has no numbers for."""
+    """Return a value with plain numbers for NumPy's, and None for numbers that JSON lacks."""
     match value:
         case dict():
             return {name: _plain(one) for name, one in value.items()}
@@ -188,15 +183,15 @@ class Parent(logging.Handler):
         self._messages = os.fdopen(os.dup(1), "wb")
         os.dup2(2, 1)
 
-    def told(self, message: Mapping[str, Any], *files: bytes) -> None:
-        """Say it, the members of a `worker.protocol.Message`, and hand over the files behind it."""
+    def send(self, message: Mapping[str, Any], *files: bytes) -> None:
+        """Write a `worker.protocol.Message` as a line of JSON, and the files behind it."""
         self._messages.write(encode(message) + b"\n")
         self._messages.writelines(files)
         self._messages.flush()
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Say a line of the log, which the parent knows the job of."""
-        self.told({"warning": self.format(record)})
+        """Send a line of the log to the parent, which adds the job."""
+        self.send({"warning": self.format(record)})
 
 
 if __name__ == "__main__":

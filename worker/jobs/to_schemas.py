@@ -1,4 +1,4 @@
-"""What the kinds of jobs share: what they compute with, how they end, how the engine's answer becomes the wire's."""
+"""Conversion of the engine's answers to documents of the wire, and other parts that the kinds of jobs share."""
 
 from __future__ import annotations
 
@@ -25,11 +25,12 @@ from worker.calibration.geometry.lens import Lens
 from worker.calibration.refinement import cross_check, uncertainty
 from worker.calibration.stitching.photometry import Light
 from worker.compute_resources import ComputeResources
-from worker.jobs import answers
-from worker.jobs.answers import (
+from worker.jobs import documents
+from worker.jobs.documents import (
     CameraResult,
     CrossCheck,
     Displacement,
+    Intrinsics,
     MarkingResult,
     Moved,
     PairResult,
@@ -43,8 +44,7 @@ from worker.jobs.answers import (
 from worker.jobs.from_schemas import JobFailedError, camera_of
 
 if TYPE_CHECKING:
-    from service.schemas import trend
-    from worker.jobs import inputs
+    from service.schemas.trend import Anchor
 
 PROVIDERS = {"cpu": "CPUExecutionProvider", "cuda": "CUDAExecutionProvider", "openvino": "OpenVINOExecutionProvider"}
 # The engine's report ends with the refinement; what is left is drawing.
@@ -56,10 +56,10 @@ R = TypeVar("R", covariant=True)
 
 @dataclass(frozen=True)
 class Solution(Generic[R]):
-    """A result and the files of its pictures, by the names that `service.store.jobs.files.picture_file` knows.
+    """A result and the files of its pictures by the names that `service.store.jobs.files.picture_file` knows.
 
-    That of a calibration is a plain record, those of other kinds are models of the wire.
-    `later`: the names of those that can be drawn when somebody looks; `memories`: of the accepted cameras, by camera.
+    The result of a calibration is a document, those of other kinds are models of the wire.
+    `later`: names of pictures that can be drawn when somebody looks; `memories`: of the accepted cameras, by camera.
     """
 
     result: R
@@ -69,22 +69,22 @@ class Solution(Generic[R]):
 
 
 def provenance_of(means: ComputeResources, segmenter: Segmenter, seed: int, options: dict[str, Any]) -> Provenance:
-    """What computes a solution by these options, so that it can be computed again."""
-    return {"software": means.software, "model_sha256": segmenter.sha256, "seed": seed, "options": options}
+    """Return software, model, seed and options, by which a result can be computed again."""
+    return Provenance(software=means.software, model_sha256=segmenter.sha256, seed=seed, options=options)
 
 
 def round_to_ms(timings_s: Mapping[str, float]) -> dict[str, float]:
-    """The seconds of each stage, as a result shows them."""
+    """Return the seconds of each stage, rounded to milliseconds."""
     return {stage: round(seconds, 3) for stage, seconds in timings_s.items()}
 
 
-def lens_to_schema(lens: Lens) -> answers.Intrinsics:
-    """A lens of the engine for the wire."""
+def lens_to_schema(lens: Lens) -> Intrinsics:
+    """Return a lens of the engine for the wire."""
     # What photos or clicks hardly tell has a deviation beyond any number that says something.
     sigma = {
         name: min(max(value, LEAST_SIGMA), LARGEST_SIGMA) for name, value in lens.sigma.items() if not isnan(value)
     }
-    return answers.Intrinsics(
+    return Intrinsics(
         model=lens.model,
         matrix=lens.matrix.tolist(),
         distortion=lens.distortion.tolist(),
@@ -93,32 +93,32 @@ def lens_to_schema(lens: Lens) -> answers.Intrinsics:
     )
 
 
-def light_to_schema(light: Light) -> answers.Light:
-    """How a camera's picture is evened out, for the wire: colours from red to blue."""
-    return answers.Light(
+def light_to_schema(light: Light) -> documents.Light:
+    """Return a camera's photometric correction for the wire, its colours from red to blue."""
+    return documents.Light(
         gain=[*reversed(light.gain)], contrast=light.contrast, falloff=light.falloff, reach=light.reach
     )
 
 
-def pose_to_schema(pose: Pose) -> answers.Pose:
-    """A pose of the engine for the wire."""
-    return answers.Pose(
+def pose_to_schema(pose: Pose) -> documents.Pose:
+    """Return a pose of the engine for the wire."""
+    return documents.Pose(
         rotation=pose.rotation.tolist(), position=pose.position.tolist(), translation=pose.translation.tolist()
     )
 
 
 def ridge_to_schema(pitch: Field) -> list[list[float]] | None:
-    """The two ends of a pitch's ridge for the wire, in millimetres; None of a flat one."""
+    """Return the two ends of a pitch's ridge (m, to the millimetre), or None for a flat one."""
     return None if pitch.ridge is None else pitch.ridge.round(MILLIMETRE).tolist()
 
 
 def finite_or_none(value: Any) -> float | None:
-    """JSON has no NaN and no infinity."""
+    """Return a number, or None for NaN and infinity, which JSON lacks."""
     return float(value) if value is not None and isfinite(value) else None
 
 
 def load_segmenter(means: ComputeResources) -> Segmenter:
-    """The network that the settings name, which is loaded when it is first asked."""
+    """Return the network that the settings name; it is loaded at its first use."""
     if not means.model.is_file():
         raise JobFailedError("model-missing", f"{means.model} is not there; set ESC_MODEL or train one.")
     return Segmenter(means.model, means.threads, PROVIDERS[means.provider])
@@ -126,7 +126,7 @@ def load_segmenter(means: ComputeResources) -> Segmenter:
 
 @contextmanager
 def engine_failures() -> Iterator[None]:
-    """Say of what the engine cannot compute why the job has no result; raises `JobFailedError`."""
+    """Raise `JobFailedError` for errors of the engine that explain why the job has no result."""
     try:
         yield
     except records.CalibrationError as error:
@@ -138,32 +138,28 @@ def engine_failures() -> Iterator[None]:
 
 
 def progress_to_schema(step: records.Progress) -> Progress:
-    """How far the engine is, with room for the pictures."""
-    progress = Progress(
+    """Return the engine's progress for the wire, with room left for the pictures."""
+    return Progress(
         stage=step.stage,
         fraction=min(max(step.fraction, 0.0), PREVIEW_FRACTION),
         generation=step.generation,
         loss=finite_or_none(step.loss),
+        expected_end=None if step.remaining_s is None else _moment_in(step.remaining_s),
     )
-    if step.remaining_s is not None:
-        progress["expected_end"] = (datetime.now(UTC) + timedelta(seconds=step.remaining_s)).isoformat()
-    return progress
 
 
-def camera_to_schema(
-    found: quality.CameraResult,
-    lens: answers.Intrinsics | None = None,
-    light: answers.Light | None = None,
-    moved_from_anchor: Displacement | None = None,
-) -> CameraResult:
-    """What a finish has to say of a camera; `lens` and `light` where they were found as well."""
+def _moment_in(seconds: float) -> str:
+    return (datetime.now(UTC) + timedelta(seconds=seconds)).isoformat()
+
+
+def camera_to_schema(found: quality.CameraResult) -> CameraResult:
+    """Return the result of a camera by its refinement alone, without what calibrations add from lights and memories."""
     return CameraResult(
         id=found.camera.id,
         accepted=found.accepted,
         rejected_because=found.rejected_because,
         refusal=None if found.refusal is None else refusal_uri(found.refusal.reason),
         pose=pose_to_schema(found.camera.pose),
-        intrinsics=lens,
         sigma=sigma_to_schema(found.sigma),
         repeatability=sigma_to_schema(found.repeatability),
         moved=_moved(found.moved),
@@ -174,15 +170,9 @@ def camera_to_schema(
         by_chance=finite_or_none(found.evidence.by_chance),
         view=_view(found.view),
         residual_px=finite_or_none(found.residual_px),
-        light=light,
-        refined=None,
-        lens_change=None,
-        nights=0,
-        seen_by_network=None,
         markings=[_marking(one) for one in found.markings],
         knocked=found.knocked,
         proposed=_proposal(found) if _is_proposed(found) else None,
-        displacement=moved_from_anchor,
         cross_check=_cross_check(found.cross_checked()),
     )
 
@@ -204,15 +194,13 @@ def _proposal(found: quality.CameraResult) -> Proposal:
     )
 
 
-def displacement_to_schema(
-    pitch: Field, found: quality.CameraResult, anchor: trend.Anchor | inputs.Anchor | None
-) -> Displacement | None:
-    """How far a camera is from its anchor; one that has none yet is its own. None where that cannot be told."""
-    begun = found.camera if anchor is None else camera_of(anchor.posed)
-    moved = measure_displacement(pitch, begun, found)
+def displacement_to_schema(pitch: Field, found: quality.CameraResult, anchor: Anchor | None) -> Displacement | None:
+    """Return the displacement of a camera from its anchor, or from itself without one; None if it is unknown."""
+    reference = found.camera if anchor is None else camera_of(anchor.posed)
+    moved = measure_displacement(pitch, reference, found)
     if moved is None:
         return None
-    turned_and_moved = quality.Moved.between(pitch, begun, found.camera)
+    turned_and_moved = quality.Moved.between(pitch, reference, found.camera)
     return Displacement(
         anchor=None if anchor is None else anchor.revision,
         at=moved.place[:2].round(2).tolist(),
@@ -247,7 +235,7 @@ def _marking(seen: MarkingReport) -> MarkingResult:
 
 
 def pair_to_schema(pair: Pair, found: seam.Seam) -> PairResult:
-    """What two cameras say of each other."""
+    """Return the comparison of two cameras for the wire."""
     return PairResult(
         cameras=list(pair.cameras),
         stitch_error_px=finite_or_none(pair.error_px),
@@ -266,7 +254,7 @@ def _place(place: seam.SeamPlace) -> SeamPlace:
 
 
 def _rounded_cm(metres: float | None) -> float | None:
-    """To the millimetre."""
+    """Return a length in centimetres, rounded to the millimetre."""
     return None if metres is None or not isfinite(metres) else round(100 * metres, 1)
 
 
@@ -282,7 +270,7 @@ def _view(found: ViewCondition) -> View:
 
 
 def sigma_to_schema(sigma: uncertainty.Sigma | None) -> Sigma | None:
-    """A standard deviation of the engine for the wire; None where a pose is not determined."""
+    """Return a standard deviation of the engine for the wire, or None if the pose is not determined."""
     if sigma is None or not isfinite(sigma.rotation_deg) or not isfinite(sigma.position_m):
         return None
     return Sigma(rotation_deg=sigma.rotation_deg, position_m=sigma.position_m)

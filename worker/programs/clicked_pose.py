@@ -20,33 +20,33 @@ from worker.jobs.locate import clicks_of, pose_of, result_of
 
 # A line is drawn as far as this beside the picture, in widths of it: what is further out is not worth drawing.
 BESIDE = 0.25
-# Of the points of a marking, which are a quarter of a metre apart.
+# Every so many-th point of a marking is drawn; they are a quarter of a metre apart.
 EVERY = 3
 
 
 def main() -> None:
     """Read the clicks, write the pose."""
     child_process.begin_decoder()
-    asked = ClickedPoseRequest.model_validate_json(sys.stdin.buffer.read())
-    sys.stdout.write(answer(asked).model_dump_json())
+    request = ClickedPoseRequest.model_validate_json(sys.stdin.buffer.read())
+    sys.stdout.write(answer(request).model_dump_json())
 
 
-def answer(asked: ClickedPoseRequest) -> ClickedPose:
-    """The pose, the field as it has it, and where it expects each point; or why there is none."""
+def answer(request: ClickedPoseRequest) -> ClickedPose:
+    """Return the pose, the lines of the field and the expected clicks by it, or why there is none."""
     begun = time.perf_counter()
-    pitch = pitch_of(asked.field)
+    pitch = pitch_of(request.field)
     try:
-        clicks = clicks_of(asked.id, pitch, asked.points)
-        found = pose_of(asked.id, pitch, lens_of(asked.intrinsics, asked.image_size), clicks)
+        clicks = clicks_of(request.id, pitch, request.points)
+        found = pose_of(request.id, pitch, lens_of(request.intrinsics, request.image_size), clicks)
     except JobFailedError as failure:
         return ClickedPose(result=None, error=failure.error, lines=[], expected=[])
-    result = result_of(found, asked.points, {"fit": time.perf_counter() - begun})
+    result = result_of(found, request.points, {"fit": time.perf_counter() - begun})
     expected = [[float(x), float(y)] if isfinite(x + y) else None for x, y in found.camera.project(clicks.world)]
     return ClickedPose(result=result, error=None, lines=_lines(pitch, found.camera), expected=expected)
 
 
 def _lines(pitch: Field, camera: Camera) -> list[Polyline]:
-    """Each marking in pixels, broken where the camera does not see it."""
+    """Return each marking in pixels, broken where the camera does not see it."""
     lines: list[Polyline] = []
     width, _ = camera.intrinsics.size
     for marking in pitch.markings():

@@ -35,28 +35,30 @@ def main() -> None:
     """Read the frames, write the pictures."""
     child_process.begin_decoder()
     logging.basicConfig()
-    given = sys.stdin.buffer.read()
-    asked = DrawingRequest.model_validate_json(given[: given.index(b"\n")])
-    cv2.setNumThreads(asked.threads)
-    pictures = draw(scene_of(asked, decode_files(asked.sizes, given)), asked.names)
+    data = sys.stdin.buffer.read()
+    request = DrawingRequest.model_validate_json(data[: data.index(b"\n")])
+    cv2.setNumThreads(request.threads)
+    pictures = draw(scene_of(request, decode_files(request.sizes, data)), request.names)
     drawn = DrawnPictures(sizes={name: len(picture) for name, picture in pictures.items()})
     sys.stdout.buffer.write(encode_message(drawn, pictures))
 
 
-def scene_of(asked: DrawingRequest, files: Mapping[str, bytes]) -> PictureInputs:
+def scene_of(request: DrawingRequest, files: Mapping[str, bytes]) -> PictureInputs:
     """Frames only of the cameras whose files came."""
-    sizes = {camera.id: camera.image_size for camera in asked.stored.cameras}
-    with ThreadPoolExecutor(asked.threads) as each:
+    sizes = {camera.id: camera.image_size for camera in request.stored.cameras}
+    with ThreadPoolExecutor(request.threads) as each:
         frames = each.map(lambda camera: decode_frame(camera, sizes[camera], files[camera]), files)
         decoded = dict(zip(files, frames, strict=True))
-    markings = {camera: [_seen(one) for one in seen] for camera, seen in asked.markings.items()}
-    lights = {camera: light_of(light) for camera, light in asked.lights.items()}
-    return PictureInputs(_standing(asked.stored, asked), _standing(asked.found, asked), decoded, markings, lights)
+    markings = {camera: [_seen(one) for one in seen] for camera, seen in request.markings.items()}
+    lights = {camera: light_of(light) for camera, light in request.lights.items()}
+    return PictureInputs(
+        _standing(request.stored, request), _standing(request.found, request), decoded, markings, lights
+    )
 
 
-def _standing(standing: FieldAndCameras, asked: DrawingRequest) -> tuple[Field, list[Camera]]:
+def _standing(standing: FieldAndCameras, request: DrawingRequest) -> tuple[Field, list[Camera]]:
     return pitch_of(standing.field), [
-        camera_with_ignored_areas(camera, asked.ignore[camera.id]) for camera in standing.cameras
+        camera_with_ignored_areas(camera, request.ignore[camera.id]) for camera in standing.cameras
     ]
 
 

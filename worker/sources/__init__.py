@@ -1,1 +1,1 @@
-"""What cameras speak: pictures by HTTP, endless ones too, and streams by RTSP."""
+"""Protocols of cameras: pictures and motion JPEG by HTTP, streams by RTSP."""

@@ -130,7 +130,7 @@ async def _body(head: Message, stream: asyncio.StreamReader) -> AsyncIterator[by
         async for piece in pieces:
             yield piece
         return
-    # Of zlib: either of the two, whichever it is.
+    # zlib reads either of the two.
     decoder = zlib.decompressobj(wbits=zlib.MAX_WBITS | 32)
     try:
         async for piece in pieces:

@@ -30,7 +30,7 @@ class Message:
 
     @property
     def is_response(self) -> bool:
-        """Whether it is a response."""
+        """True for a response, False for a request."""
         return self.first.startswith("RTSP/")
 
     @property
@@ -59,15 +59,15 @@ class Message:
 
     def all(self, name: str) -> list[str]:
         """The values of a header."""
-        return [value for its, value in self.headers if its.lower() == name.lower()]
+        return [value for key, value in self.headers if key.lower() == name.lower()]
 
     def having(self, name: str, value: str) -> Message:
         """Return the message with one header of this name."""
-        others = [(its, kept) for its, kept in self.headers if its.lower() != name.lower()]
+        others = [(key, kept) for key, kept in self.headers if key.lower() != name.lower()]
         return replace(self, headers=(*others, (name, value)))
 
     def encoded(self) -> bytes:
-        """As it is sent."""
+        """Return the bytes of the message."""
         lines = [self.first, *(f"{name}: {value}" for name, value in self.headers), "", ""]
         return "\r\n".join(lines).encode("utf-8", "surrogateescape") + self.body
 

@@ -156,7 +156,7 @@ class Relay:
 
 
 class _Talk:
-    """What FFmpeg and the camera say to each other over one pair of connections."""
+    """The conversation of FFmpeg and the camera over one pair of connections."""
 
     def __init__(self, relay: Relay, to_camera: asyncio.StreamWriter, to_player: asyncio.StreamWriter) -> None:
         self._relay = relay

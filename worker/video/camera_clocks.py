@@ -20,7 +20,7 @@ LATEST_S = 10.0
 
 
 class CameraClocks:
-    """Which of the cameras have reported their clocks, for the threads that read their streams."""
+    """Reports of the clocks of all cameras, shared by the threads that read their streams."""
 
     def __init__(self, cameras: Iterable[str]) -> None:
         self._begun_ns = time.time_ns()
@@ -30,7 +30,7 @@ class CameraClocks:
         self._lock = threading.Lock()
 
     def report(self, camera: str, taken_ns: int | None) -> bool:
-        """Take what a picture that has just come says of its time (ns, Unix time); whether all cameras have reported.
+        """Take the time (ns, Unix time) of a picture that has just come; return True once all cameras have reported.
 
         Raises `VideoError` where one has not in time, and where a clock differs too far from this machine's.
         """

@@ -64,7 +64,7 @@ class ClipPicture:
 
 @dataclass(frozen=True)
 class ClipProperties:
-    """What is known of a clip before it is read. `seconds`: how long it is, None for a live stream."""
+    """Properties of a clip before it is read. `seconds`: its length, None for a live stream."""
 
     size: tuple[int, int]
     rate: Fraction
@@ -90,7 +90,7 @@ class Clip:
 
     @classmethod
     def open(cls, camera: str, address: str, since: float = 0.0) -> Self:
-        """A clip as it is; `since`, of `time.monotonic`, is for live streams. `VideoError` where none can be read."""
+        """Open a clip; `since`, of `time.monotonic`, is for live streams. Raises `VideoError` if it cannot be read."""
         if find_spec("av") is None:
             raise VideoError(f"Video needs PyAV: {build.install_command('video', sys.executable)}")
         import av
@@ -105,8 +105,8 @@ class Clip:
                 raise VideoError(f"camera {camera}: there is no video in {without_login(address)}")
             video = container.streams.video[0]
             video.thread_type = "AUTO"
-            told = (rate for rate in (video.average_rate, video.guessed_rate) if rate and rate <= HIGHEST_RATE)
-            rate = next(told, USUAL_RATE)
+            rates = (rate for rate in (video.average_rate, video.guessed_rate) if rate and rate <= HIGHEST_RATE)
+            rate = next(rates, USUAL_RATE)
             seconds = None if live or container.duration is None else container.duration / av.time_base
             size = video.codec_context.width, video.codec_context.height
             facts = ClipProperties(size, Fraction(rate), seconds)
@@ -114,17 +114,17 @@ class Clip:
 
     @property
     def live(self) -> bool:
-        """Whether it cannot be read a second time."""
+        """True for a stream, which cannot be read a second time."""
         return is_live(self.address)
 
     @property
     def reports_clock(self) -> bool:
-        """Whether its camera may tell when pictures were taken: by RTCP, which belongs to RTSP."""
+        """True if its camera may report when pictures were taken, by RTCP, which belongs to RTSP."""
         return _is_rtsp(self.address)
 
     @property
     def has_sound(self) -> bool:
-        """Whether it can be listened to."""
+        """True if the clip has a sound track."""
         return bool(self.container.streams.audio)
 
     def listen(self) -> None:
@@ -144,7 +144,7 @@ class Clip:
         self.video.codec_context.skip_frame = "NONKEY" if only else "DEFAULT"
 
     def shots(self, begin_s: float = 0.0) -> Iterator[ClipPicture]:
-        """The pictures from about a time on, to the end; `VideoError` where a picture is not as the first one.
+        """Yield the pictures from about a time on; raises `VideoError` for one of another size than the first.
 
         A live stream goes on from where it was read to.
         """
@@ -179,11 +179,11 @@ class Clip:
         self.broken += broken
 
     def sound_time(self, packet: Packet[AudioStream]) -> float:
-        """When a packet of sound that came with a picture begins, in the clip's time."""
+        """Return when a packet of sound begins, in the clip's time (s)."""
         return float((packet.pts or 0) * packet.time_base) - (self._zero or 0.0)
 
     def close(self) -> None:
-        """Let go of the file or stream."""
+        """Close the file or stream."""
         self.container.close()
         self.relay.close()
 
@@ -196,7 +196,7 @@ class Clip:
         self.close()
 
     def _enter(self, begin_s: float) -> float | None:
-        """Go to a time of a file; when it begins in its own time, None where only its first picture tells."""
+        """Seek a time in a file; return when it begins in its own time, None if only its first picture tells."""
         if self.live:
             return self._zero
         if self.video.start_time is None or self.video.time_base is None:
@@ -207,14 +207,14 @@ class Clip:
         return start
 
     def _time(self, at: float, taken_ns: int | None) -> float | None:
-        """The clip's time of a picture, `at` in its own; None while cameras have not reported their clocks."""
+        """Return the clip's time of a picture, `at` in its own; None while cameras have not reported their clocks."""
         if self._clocks is None:
             self._zero = at - self._lateness() if self._zero is None else self._zero
             return at - self._zero
         if not self._clocks.report(self.camera, taken_ns) or taken_ns is None:
             return None
         time_s = self._clocks.time_s(taken_ns)
-        # Of sound, which has no clock of its own.
+        # Sound has no clock of its own.
         self._zero = at - time_s
         return time_s
 
@@ -274,12 +274,12 @@ def camera_for_clip(camera: Camera, clip: Clip | None) -> Camera:
 
 
 def is_live(address: str) -> bool:
-    """Whether an address is a stream's rather than a file's."""
+    """Return True for the address of a stream, False for a file."""
     return "://" in address
 
 
 def without_login(address: str) -> str:
-    """An address as it may be shown: user and password of a stream are nobody's business."""
+    """Return an address without the user and password of a stream."""
     return _split_login(address)[0]
 
 
@@ -319,7 +319,7 @@ def _open(camera: str, address: str, stack: ExitStack) -> InputContainer:
 
 
 def _decoded(packet: Packet[VideoStream]) -> tuple[list[av.VideoFrame], int]:
-    """The pictures that a packet completes, and how many it broke."""
+    """Decode a packet; return the pictures that it completes and the number of broken ones."""
     import av
 
     try:

@@ -42,7 +42,7 @@ FACTORED = ("libx264", "libx265")
 
 @dataclass(frozen=True)
 class Encoding:
-    """How pictures are coded: any video encoder of libav; `crf` and `preset` are for those that have them."""
+    """Choice of a video encoder of libav; `crf` and `preset` are for those that have them."""
 
     codec: str = "libx264"
     crf: int = 20
@@ -50,7 +50,7 @@ class Encoding:
 
     @property
     def options(self) -> dict[str, str]:
-        """As the encoder takes them."""
+        """Options of the encoder."""
         return {"crf": str(self.crf), "preset": self.preset} if self.codec in FACTORED else {}
 
 
@@ -88,7 +88,7 @@ class Writer:
             self._discard()
             raise
         self._queue: queue.Queue[tuple[VideoFrame, Sequence[Packet[AudioStream]]] | None] = queue.Queue(WAITING)
-        self._heard: deque[Packet[AudioStream]] = deque()
+        self._sound_queue: deque[Packet[AudioStream]] = deque()
         self._written = 0
         self._error: BaseException | None = None
         self._began = time.monotonic()
@@ -150,10 +150,10 @@ class Writer:
     def _write(self, frame: VideoFrame, sound: Sequence[Packet[AudioStream]]) -> None:
         self._container.mux(self._video.encode(frame))
         self._written += 1
-        self._heard.extend(sound)
+        self._sound_queue.extend(sound)
         # Clips have sound written some way ahead of pictures, and of pictures that follow no more there is to be none.
-        while self._heard and (begins_s := self._begins_s(self._heard[0])) < self._written / self._rate:
-            self._write_sound(self._heard.popleft(), begins_s)
+        while self._sound_queue and (begins_s := self._begins_s(self._sound_queue[0])) < self._written / self._rate:
+            self._write_sound(self._sound_queue.popleft(), begins_s)
 
     def _begins_s(self, packet: Packet[AudioStream]) -> float:
         return 0.0 if self._sound is None else self._sound.clip.sound_time(packet) - self._sound.begin_s
@@ -180,13 +180,15 @@ class Writer:
         if isinstance(self._error, VideoError):
             raise self._error
         number = getattr(self._error, "errno", None)
-        said = getattr(self._error, "strerror", None) or str(self._error)
-        left = "; nothing is left of it" if self._part is not None else ""
+        reason = getattr(self._error, "strerror", None) or str(self._error)
+        remainder = "; nothing is left of it" if self._part is not None else ""
         hint = " Free some space or write elsewhere." if number == 28 else ""
-        raise VideoError(f"{without_login(self._address)} cannot be written: {said}{left}.{hint}") from self._error
+        raise VideoError(
+            f"{without_login(self._address)} cannot be written: {reason}{remainder}.{hint}"
+        ) from self._error
 
     def _sent(self) -> int:
-        """How the sender ended."""
+        """Wait for the sender to end; return its exit code."""
         if self._sender is None or self._sender.stdin is None:
             return 0
         with suppress(OSError):
@@ -234,9 +236,9 @@ def _srt_sender(address: str) -> subprocess.Popen[bytes]:
     """ffmpeg, which sends by SRT what it is given: the FFmpeg within PyAV cannot."""
     if shutil.which("ffmpeg") is None:
         raise VideoError("srt:// is sent by ffmpeg, which is not on this machine (Debian: apt-get install ffmpeg)")
-    given = "-analyzeduration", "100000", "-f", "mpegts", "-i", "pipe:0"
-    sent = "-c", "copy", "-f", "mpegts", address
-    return subprocess.Popen(["ffmpeg", "-v", "error", *given, *sent], stdin=subprocess.PIPE)
+    source = "-analyzeduration", "100000", "-f", "mpegts", "-i", "pipe:0"
+    target = "-c", "copy", "-f", "mpegts", address
+    return subprocess.Popen(["ffmpeg", "-v", "error", *source, *target], stdin=subprocess.PIPE)
 
 
 def _video_stream(container: OutputContainer, size: tuple[int, int], rate: Fraction, encoding: Encoding) -> Any:

@@ -1,4 +1,4 @@
-"""Which picture of each clip stands for a moment: the nearest one, read ahead by a thread of its own."""
+"""Choice of the picture of each clip nearest to a moment; pictures are read ahead by a thread."""
 
 from __future__ import annotations
 
@@ -81,19 +81,19 @@ class ClipTrack:
         if self._now is None:
             raise VideoError(f"camera {self.camera}: no picture of its clip can be decoded, from where it is to begin")
         self._next = next(self.shots, None)
-        self._heard(self._now)
+        self._collect_sound(self._now)
 
     @property
     def begin_s(self) -> float:
-        """When the clip begins, in the time of all; a live stream begins when it arrives."""
+        """Beginning of the clip in the time of all (s); a live stream begins when it arrives."""
         return self.offset_s + (self._now.time_s if self.live and self._now is not None else 0.0)
 
     def at(self, time_s: float) -> ClipPicture | None:
-        """The nearest picture, None once the clip has ended; `VideoError` where too many were broken."""
+        """Return the nearest picture, None once the clip has ended; raises `VideoError` if too many were broken."""
         own = time_s - self.offset_s
         while self._next is not None and self._now is not None and self._next.time_s - own <= own - self._now.time_s:
             self._now = self._next
-            self._heard(self._now)
+            self._collect_sound(self._now)
             self._next = next(self.shots, None)
         if self._now is None:
             return None
@@ -112,10 +112,10 @@ class ClipTrack:
                     f"and the next good one is {gap:.2f} s later; more than {LONGEST_GAP_S:g} s is not bridged. "
                     "Cut the clip there, or copy it again"
                 )
-        beside = shown.broken or (self._next is not None and self._next.broken)
-        if beside and abs(own - shown.time_s) > LAST_SHOWN * self.interval_s:
+        is_next_to_broken = shown.broken or (self._next is not None and self._next.broken)
+        if is_next_to_broken and abs(own - shown.time_s) > LAST_SHOWN * self.interval_s:
             self.repeated += 1
 
-    def _heard(self, shot: ClipPicture | None) -> None:
+    def _collect_sound(self, shot: ClipPicture | None) -> None:
         if shot is not None:
             self.sound.extend(shot.sound)

@@ -88,12 +88,12 @@ class _ArrivedPicture:
 
     @property
     def delay_s(self) -> float | None:
-        """How long after it was taken a prompt picture arrives, by both clocks."""
+        """Seconds from when a prompt picture is taken to its arrival, by both clocks; None if its time is unknown."""
         return None if self.taken_ns is None else (self.arrived_ns - self.taken_ns) / 1e9 - self.late_s
 
     @property
     def clock_offset_s(self) -> float | None:
-        """The camera's clock less the time in its stream: the same for all pictures unless that clock is set."""
+        """Camera's clock less the time in its stream (s), which only changes if that clock is set."""
         return None if self.taken_ns is None else self.taken_ns / 1e9 - self.stream_s
 
 
@@ -190,7 +190,7 @@ class StreamTracker:
     _unseen_since: float | None = field(default=None, init=False)
 
     def start(self) -> None:
-        """Begin to track it."""
+        """Start the thread that tracks the camera."""
         threading.Thread(target=self._run, name=f"track {self.stored.id}", daemon=True).start()
 
     def anchor(self, stored: Camera) -> None:
@@ -200,12 +200,12 @@ class StreamTracker:
 
     @property
     def unseen_s(self) -> float:
-        """For how long its pictures have come without its lines where they are expected, as well as they should fit."""
+        """Seconds for which pictures have come whose lines were not found where they are expected."""
         unseen_since = self._unseen_since
         return 0.0 if unseen_since is None or self._latest() is None else time.monotonic() - unseen_since
 
     def newest_frame(self) -> Frame | None:
-        """Its newest picture in the size of its lens; None where that is old or frozen."""
+        """Return the newest picture, in the size of its lens, or None if it is old or frozen."""
         latest = self._latest()
         if latest is None:
             return None
@@ -214,7 +214,7 @@ class StreamTracker:
         return frame if latest.picture.size == size else np.asarray(cv2.resize(frame, size), np.uint8)
 
     def _latest(self) -> _ArrivedPicture | None:
-        """The newest picture that shows something new, unless that is old. Not the one that is looked at."""
+        """Return the newest picture that shows something new, unless it is old."""
         latest = None if self._pictures is None else self._pictures.latest
         return None if latest is None or time.time_ns() - latest.arrived_ns > NEWEST_S * 1e9 else latest
 
@@ -273,7 +273,7 @@ class StreamTracker:
         self.report(LivePose(tracked, at_ns + ahead_ns, clock, arrived.arrived_ns, arrived.number, rate))
 
     def _is_clock_plausible(self, arrived: _ArrivedPicture) -> bool:
-        """Whether the camera's clock can be right, by what it says of a picture."""
+        """Return True if the camera's clock is plausible for a picture; report changes of that."""
         delay_s, offset_s = arrived.delay_s, arrived.clock_offset_s
         if delay_s is None or offset_s is None:
             return False
@@ -337,12 +337,12 @@ class _Track:
     seen_s: float
 
     def goes_on(self, arrived: _ArrivedPicture, stored: Camera) -> bool:
-        """Whether the camera can be tracked from where it was: it was seen lately, and no new pose is stored."""
+        """Return True if the camera was seen lately and its stored pose is the same, so that tracking can go on."""
         gap_s = arrived.stream_s - self.stream_s
         return stored is self.stored and 0 <= gap_s <= LONGEST_GAP_S and time.monotonic() - self.seen_s <= LOST_AFTER_S
 
     def at(self, arrived: _ArrivedPicture, ahead_s: float) -> TrackedPose:
-        """The pose by a picture. Pictures that were left out, and one that shows nothing new, pass unseen."""
+        """Return the pose by a picture. Skipped pictures, and one that shows nothing new, only pass time."""
         gap_s = arrived.stream_s - self.stream_s
         steps = max(arrived.number - self.number, math.ceil(gap_s / LONGEST_STEP_S))
         # Streams whose times stand still come evenly.
@@ -355,7 +355,7 @@ class _Track:
         return self.now(ahead_s)
 
     def now(self, ahead_s: float) -> TrackedPose:
-        """The newest pose, or the one so long after it; what was before is forgotten."""
+        """Return the newest pose, or the one predicted for `ahead_s` later; earlier ones are forgotten."""
         newest = self.tracker.predicted(ahead_s) if ahead_s else self.tracker.now
         (tracked,) = newest.cameras
         self.tracker.settled()

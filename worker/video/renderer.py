@@ -49,13 +49,13 @@ class Renderer:
         self.move(panorama)
 
     def fits(self, panorama: Panorama) -> bool:
-        """Whether a panorama is of the same cameras, each counting where it did: `move` is enough for it."""
+        """Return True for a panorama of the same cameras and weights, for which `move` is enough."""
         return len(panorama.parts) == len(self._weights) and all(
             part.weight is weight for part, weight in zip(panorama.parts, self._weights, strict=True)
         )
 
     def move(self, panorama: Panorama) -> None:
-        """Sample frames where a panorama says that `fits`; the corners of a lens stay where they were in the view."""
+        """Take the sampling maps of a panorama that `fits`; vignetting stays where it was in the view."""
         self._maps = list(
             self._pool.map(
                 lambda strip: [
@@ -78,7 +78,7 @@ class Renderer:
             pass
 
     def close(self) -> None:
-        """Let go of the threads."""
+        """End the threads."""
         self._pool.shutdown()
 
     def _make(self, strip: _Strip, maps: Sequence[_Maps], levels: Sequence[Mapping[int, Planes]], onto: Planes) -> None:
@@ -98,14 +98,14 @@ class Renderer:
             made: Sequence[Any] = [np.empty(plane.shape, np.uint8) for plane in target]
             _sample(source, at, made)
             if view.lit:
-                made = _evened(view, stretch, made)
+                made = _corrected(view, stretch, made)
             for plane, new, share in zip(target, made, stretch.share or 3 * (None,), strict=True):
                 plane[:] = new if share is None else cv2.blendLinear(new, plane, share, 1 - share)
 
 
 @dataclass(frozen=True)
 class _View:
-    """What is done to one camera's pixels: `tones` (256, 3) of blue, green and red, `luma` (256,) of grey."""
+    """Photometric correction of a camera: look-up `tones` (256, 3) of blue, green and red, `luma` (256,) of grey."""
 
     camera: str
     lit: bool
@@ -151,7 +151,7 @@ class _Strip:
 
 @dataclass(frozen=True)
 class _Maps:
-    """Where a stretch is sampled, its luma and its chroma."""
+    """Sampling maps of a stretch, for luma and for chroma."""
 
     luma: Map
     chroma: Map
@@ -174,7 +174,7 @@ def _strip(panorama: Panorama, rows: slice) -> _Strip:
 
 
 def _stretches(number: int, part: Contribution, rows: slice, share: NDArray[np.float32]) -> list[_Stretch]:
-    """The columns of a strip where a camera counts, blocks that are alike put together."""
+    """Return the stretches of a strip where a camera counts; blocks that are alike are merged."""
     source = part.source[rows]
     kinds = []
     for left in range(0, share.shape[1], BLOCK_COLUMNS):
@@ -196,7 +196,7 @@ def _stretches(number: int, part: Contribution, rows: slice, share: NDArray[np.f
 
 
 def _level(source: NDArray[np.float32], counts: NDArray[np.bool_]) -> int:
-    """How often a frame is halved before it is sampled: as often as the view has room for, as in `sampled`."""
+    """Return how often a frame is halved before it is sampled, as the view's resolution allows (see `sampled`)."""
     (x_down, x_right), (y_down, y_right) = np.gradient(source[..., 0]), np.gradient(source[..., 1])
     area = float(np.median(np.abs(x_right * y_down - y_right * x_down)[counts]))
     return int(np.clip(np.floor(0.5 * np.log2(max(area, 1.0))), 0, LARGEST_LEVEL))
@@ -209,7 +209,7 @@ def _maps(part: Contribution, rows: slice, stretch: _Stretch) -> _Maps:
 
 
 def _between(source: NDArray[np.float32], share: Sequence[NDArray[np.float32]] | None) -> NDArray[np.float32]:
-    """Where chroma of two by two pixels is looked for: beside the left ones of them, between those that are seen."""
+    """Return the sampling places of chroma, one for 2 x 2 pixels: left, between the upper and lower that are seen."""
     upper, lower = source[::2, ::2], source[1::2, ::2]
     between = (upper + lower) / np.float32(2)
     if share is None:
@@ -266,7 +266,7 @@ def _halved(extent: slice) -> slice:
 
 
 def _levels(planes: Planes, used: Sequence[int]) -> dict[int, Planes]:
-    """The planes halved as often as they are used."""
+    """Return the planes at each level of detail that is used."""
     found = {0: planes}
     for level in range(1, used[-1] + 1):
         luma, blue, red = (_shrunk(plane) for plane in found[level - 1])
@@ -286,8 +286,8 @@ def _sample(source: Planes, maps: _Maps, target: Sequence[Plane]) -> None:
         cv2.remap(plane, *at, cv2.INTER_LINEAR, onto, cv2.BORDER_REPLICATE)
 
 
-def _evened(view: _View, stretch: _Stretch, planes: Sequence[Any]) -> Sequence[Any]:
-    """The planes in the light of the other cameras."""
+def _corrected(view: _View, stretch: _Stretch, planes: Sequence[Any]) -> Sequence[Any]:
+    """Return the planes with the camera's photometric correction."""
     luma, blue, red = planes
     coarse: Any = cv2.resize(luma, (blue.shape[1], blue.shape[0]), interpolation=cv2.INTER_AREA)
     colours: Any = cv2.LUT(cv2.transform(cv2.merge((coarse, blue, red)), FROM_PLANES), view.tones)
@@ -305,7 +305,7 @@ def _evened(view: _View, stretch: _Stretch, planes: Sequence[Any]) -> Sequence[A
 
 
 def _raised(values: Any, part: Plane, steepest: float, black: int) -> Any:
-    """Values above `black` multiplied by what the lens took from them."""
+    """Return values with the vignetting of the lens removed from what is above `black`."""
     above = cv2.addWeighted(values, 1, values, 0, -black) if black else values
     change = cv2.multiply(above, part, scale=abs(steepest) / 255)
     return cv2.add(values, change) if steepest > 0 else cv2.subtract(values, change)

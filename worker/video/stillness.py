@@ -30,7 +30,7 @@ class Stillness:
         self._changing = 1.0
 
     def shows_new(self, luma: Plane, stream_s: float) -> bool:
-        """Whether a picture (H, W) of this time of the stream says anything that the ones before did not."""
+        """Return True if a picture (H, W), at `stream_s`, differs from the one before and the camera is not frozen."""
         is_changed = self._last is None or not _is_same(self._last, luma)
         passed_s = max(0.0, stream_s - self._last_s) if self._last is not None else 0.0
         self._last, self._last_s = luma, stream_s

@@ -55,7 +55,7 @@ Begun = Callable[[Unseen], None]
 
 @dataclass(frozen=True)
 class StitchScene:
-    """What is filmed and what is to be seen of it. `lights`: of all cameras, None: as their first pictures say."""
+    """Pitch, cameras and view of a clip. `lights`: photometric corrections; None: from the first pictures."""
 
     pitch: Field
     cameras: Sequence[Camera]
@@ -64,10 +64,10 @@ class StitchScene:
 
 
 class Geometry(Protocol):
-    """Where the pixels of the view lie in the pictures of a moment; what it shows does not change its size."""
+    """Mapping from the view to the pictures of each moment; the size of the view does not change."""
 
     def at(self, number: int, pictures: Mapping[str, Picture]) -> Panorama:
-        """The panorama of the `number`th picture of the view, of the cameras that have one.
+        """Return the panorama of the `number`th picture of the view, of the cameras that have one.
 
         The same object as before as long as nothing moves. Where sources alone have moved, and the weights are the
         objects they were, tables of the renderer are kept; for other panoramas all are made anew.
@@ -89,7 +89,7 @@ class StaticGeometry:
     _made: dict[frozenset[str], Panorama] = field(default_factory=dict, init=False)
 
     def at(self, number: int, pictures: Mapping[str, Picture]) -> Panorama:  # noqa: ARG002
-        """The same one as long as the same cameras have pictures."""
+        """Return the panorama of the cameras that have pictures, the same object for the same cameras."""
         shown = frozenset(pictures)
         if shown not in self._made:
             cameras = [camera for camera in self.cameras if camera.id in shown]
@@ -103,7 +103,7 @@ class GeometryFactory(Protocol):
 
     @property
     def border(self) -> float:
-        """How much of each frame, in parts of its width from its border inwards, the view should do without."""
+        """Border of each frame that the view should leave out, as a part of the frame's width."""
         ...
 
     def __call__(
@@ -115,25 +115,25 @@ class GeometryFactory(Protocol):
         rate: Fraction,
         /,
     ) -> Geometry:
-        """The geometry of these cameras."""
+        """Return the geometry of these cameras."""
         ...
 
 
 @dataclass(frozen=True)
 class Offset:
-    """How much later a clip began: a number of seconds, or of frames."""
+    """Delay of the beginning of a clip, in seconds or in frames."""
 
     number: float
     in_frames: bool = False
 
     def seconds(self, rate: Fraction) -> float:
-        """For a clip of so many frames a second."""
+        """Return the delay in seconds, for a clip of `rate` frames a second."""
         return self.number / float(rate) if self.in_frames else self.number
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What is made of the clips.
+    """Options of a stitched clip.
 
     `offsets`: when a camera's clip began in the time of the first one's; found where there is none. `begin_s` and
     `end_s`: in the time of the first clip. `sound`: the camera whose sound is kept, `SILENT`: none, None: the first
@@ -153,11 +153,11 @@ class Plan:
 
 @dataclass(frozen=True)
 class StitchReport:
-    """What was made. `seconds`: of video; `took_s`: until it was whole.
+    """Report on a stitched clip. `took_s`: seconds until it was whole.
 
-    `found`: what the clips said of offsets that were not given; `ended`: when clips ended before the others did, in the
-    time of the first; `broken`: frames that could not be decoded, `repeated`: how many pictures of the view hold
-    another frame in place of such.
+    `found`: offsets that were estimated from the clips; `ended`: when clips ended before the others did, in the time of
+    the first; `broken`: frames that could not be decoded, `repeated`: pictures of the view with another frame in their
+    place.
     """
 
     size: tuple[int, int]
@@ -172,7 +172,7 @@ class StitchReport:
 
     @property
     def seconds(self) -> float:
-        """How long it is."""
+        """Length of the video in seconds."""
         return float(self.frames / self.rate)
 
 
@@ -180,13 +180,13 @@ def stitch(
     scene: StitchScene,
     addresses: Mapping[str, str],
     plan: Plan,
-    told: Report,
+    report: Report,
     follow: GeometryFactory = StaticGeometry,
     begun: Begun = lambda _: None,
 ) -> StitchReport:
-    """Make the clip; `VideoError` says why there is none.
+    """Make the clip; raises `VideoError` if there is none.
 
-    `told`: what is done, and which part of it is. `begun`: what no camera sees of the first picture, once it is made.
+    `report`: takes a stage and its progress 0..1. `begun`: takes the unseen part of the first picture, once it is made.
     """
     started = time.monotonic()
     _check_cameras(scene, addresses, plan)
@@ -194,11 +194,11 @@ def stitch(
         clips = {
             camera: stack.enter_context(Clip.open(camera, address, started)) for camera, address in addresses.items()
         }
-        heard = _heard(clips, plan.sound)
-        if heard is not None:
-            heard.listen()
+        sound_clip = _sound_clip(clips, plan.sound)
+        if sound_clip is not None:
+            sound_clip.listen()
         fitted = {camera.id: camera_for_clip(camera, clips.get(camera.id)) for camera in scene.cameras}
-        offsets, found = _offsets(scene, clips, fitted, plan, told)
+        offsets, found = _offsets(scene, clips, fitted, plan, report)
         rate = plan.rate or next(iter(clips.values())).facts.rate
         tracks = _tracks(stack, clips, offsets, plan.begin_s, rate)
         moments = ClipMoments(tracks, rate, plan.begin_s, plan.end_s, plan.allow_missing)
@@ -215,12 +215,12 @@ def stitch(
         geometry = follow(scene.pitch, view, shown, light, rate)
         ends = _ends(clips, offsets)
         expected = _expected(ends, moments.begin_s, rate, plan)
-        sound = None if heard is None else Sound(heard, moments.begin_s - offsets[heard.camera])
+        sound = None if sound_clip is None else Sound(sound_clip, moments.begin_s - offsets[sound_clip.camera])
         with Writer(plan.output, view.size, rate, plan.encoding, sound) as writer:
             for made in _rendered(moments, geometry, view.size, writer, plan.threads):
                 if moments.count == 1:
                     begun(unseen_part(made.seen))
-                told(f"{moments.count / (time.monotonic() - started):.1f} fps", min(1.0, moments.count / expected))
+                report(f"{moments.count / (time.monotonic() - started):.1f} fps", min(1.0, moments.count / expected))
     return StitchReport(
         view.size,
         rate,
@@ -237,7 +237,7 @@ def stitch(
 def _rendered(
     moments: ClipMoments, geometry: Geometry, size: tuple[int, int], writer: Writer, threads: int
 ) -> Iterator[Panorama]:
-    """Make and write the view of each moment, which `moments` counts; what each one was made by."""
+    """Make and write the view of each moment, which `moments` counts; yield its panorama."""
     import av
 
     renderer: Renderer | None = None
@@ -277,7 +277,7 @@ class ClipMoments:
     ended: dict[str, float] = field(default_factory=dict, init=False)
 
     def __post_init__(self) -> None:
-        """It begins when all have begun."""
+        """Set the beginning to when all clips have begun."""
         begins = [track.begin_s for track in self.tracks.values()]
         self.begin_s = max(begins + ([] if self.from_s is None else [self.from_s]))
 
@@ -286,7 +286,7 @@ class ClipMoments:
             yield pictures
 
     def first(self) -> Mapping[str, Picture]:
-        """The pictures of the first moment; `VideoError` if there is none."""
+        """Return the pictures of the first moment; raises `VideoError` if there is none."""
         if not (pictures := self._now()):
             raise VideoError(
                 "The clips have no moment in common, of what --from and --to leave of them: "
@@ -295,15 +295,15 @@ class ClipMoments:
         return pictures
 
     def sound(self) -> list[Packet[AudioStream]]:
-        """What has been heard since the last time."""
-        heard = []
+        """Return the sound since the last call."""
+        packets = []
         for track in self.tracks.values():
-            heard += track.sound
+            packets += track.sound
             track.sound = []
-        return heard
+        return packets
 
     def _now(self) -> dict[str, Picture]:
-        """Nothing once it is over."""
+        """Return the pictures of the present moment, none after the end."""
         now_s = self.begin_s + float(self.count / self.rate)
         if self.end_s is not None and now_s >= self.end_s - ROUNDING_S:
             return {}
@@ -316,7 +316,7 @@ class ClipMoments:
         return {camera: shot.picture for camera, shot in shots.items() if shot is not None}
 
     def early(self, ends: Mapping[str, float]) -> dict[str, float]:
-        """Who ended while others went on, by when clips should end; a stream that ends does so early."""
+        """Return when cameras ended before others, by the expected ends of clips; a stream that ends is early."""
         return {camera: at for camera, at in self.ended.items() if max(ends.values(), default=0.0) > at + EARLY_S}
 
 
@@ -339,8 +339,8 @@ def _check_cameras(scene: StitchScene, addresses: Mapping[str, str], plan: Plan)
         )
 
 
-def _heard(clips: Mapping[str, Clip], wanted: str | None) -> Clip | None:
-    """The clip whose sound is kept."""
+def _sound_clip(clips: Mapping[str, Clip], wanted: str | None) -> Clip | None:
+    """Return the clip whose sound is kept."""
     if wanted == SILENT:
         return None
     if wanted is None:
@@ -351,9 +351,9 @@ def _heard(clips: Mapping[str, Clip], wanted: str | None) -> Clip | None:
 
 
 def _offsets(
-    scene: StitchScene, clips: Mapping[str, Clip], fitted: Mapping[str, Camera], plan: Plan, told: Report
+    scene: StitchScene, clips: Mapping[str, Clip], fitted: Mapping[str, Camera], plan: Plan, report: Report
 ) -> tuple[dict[str, float], dict[str, OffsetEstimate]]:
-    """When each clip began in the time of the first one, and what was found of it."""
+    """Return when each clip began, in the time of the first one, and the estimates of those that were not given."""
     first = next(iter(clips))
     offsets = {first: 0.0} | {
         camera: offset.seconds(clips[camera].facts.rate) for camera, offset in plan.offsets.items()
@@ -369,7 +369,7 @@ def _offsets(
     live = [camera for camera, clip in clips.items() if clip.live]
     places = CoarseView(scene.pitch, [fitted[camera] for camera in clips])
     if len(live) == len(clips):
-        told("sync", 0.0)
+        report("sync", 0.0)
         motions = _live_motions(clips, places)
     elif live:
         raise VideoError(
@@ -377,7 +377,7 @@ def _offsets(
             f"{' and '.join(wanting)} comes; --offset {wanting[0]}=0 takes pictures as they arrive"
         )
     else:
-        motions = _motions(clips, places, offsets, plan.begin_s or 0.0, told)
+        motions = _motions(clips, places, offsets, plan.begin_s or 0.0, report)
     offsets, found = chain_offsets(places, motions, offsets)
     for camera, answer in found.items():
         if answer.second_s is None:
@@ -390,12 +390,12 @@ def _offsets(
 
 
 def _motions(
-    clips: Mapping[str, Clip], places: CoarseView, offsets: Mapping[str, float], from_s: float, told: Report
+    clips: Mapping[str, Clip], places: CoarseView, offsets: Mapping[str, float], from_s: float, report: Report
 ) -> dict[str, MotionSignal]:
     """Motion signals of clips that are files, by camera; each file is opened a second time for that."""
     motions = {}
     for number, (camera, clip) in enumerate(clips.items()):
-        told(f"sync {camera}", number / len(clips))
+        report(f"sync {camera}", number / len(clips))
         begin_s = max(0.0, from_s - offsets.get(camera, 0.0))
         with Clip.open(camera, clip.address) as again:
             motions[camera] = places.motion(camera, _until(begin_s + LOOKED_AT_S, again.shots(begin_s)))
@@ -434,7 +434,7 @@ def _tracks(
 
 
 def _ends(clips: Mapping[str, Clip], offsets: Mapping[str, float]) -> dict[str, float]:
-    """When clips end, in the time of the first one; streams go on, and of some files nobody knows it."""
+    """Return when clips end, in the time of the first one: infinity for streams, without files of unknown length."""
     return {
         camera: inf if clip.facts.seconds is None else offsets[camera] + clip.facts.seconds
         for camera, clip in clips.items()
@@ -443,6 +443,6 @@ def _ends(clips: Mapping[str, Clip], offsets: Mapping[str, float]) -> dict[str, 
 
 
 def _expected(ends: Mapping[str, float], begin_s: float, rate: Fraction, plan: Plan) -> float:
-    """How many pictures it will be, as far as one can tell; infinitely many of live streams."""
+    """Return the expected number of pictures; infinity for live streams."""
     end = (max if plan.allow_missing else min)(ends.values(), default=inf)
     return max(1.0, (min(end, inf if plan.end_s is None else plan.end_s) - begin_s) * float(rate))

@@ -1,4 +1,4 @@
-"""When the pictures of a live stream were taken, by the clock of its camera.
+"""Capture times of the pictures of a live stream, by the clock of its camera.
 
 A camera tells by RTCP's sender reports (RFC 3550, 6.4.1) which wall-clock time belongs to a time of its stream. FFmpeg
 counts on from the last report and attaches the wall-clock time to the packets of RTSP streams as `AV_PKT_DATA_PRFT`
@@ -31,14 +31,14 @@ def clock_in_words(late_s: float) -> str:
 
 
 class Lateness:
-    """How late pictures come beside the promptest ones before."""
+    """Measures the delay of pictures compared with the promptest ones before."""
 
     def __init__(self) -> None:
         self._promptest = math.inf
         self._last_s = 0.0
 
     def of(self, stream_s: float, now_s: float) -> float:
-        """Seconds that a picture of this time of the stream is late, if it comes `now_s`."""
+        """Return the delay in seconds of a picture with the time `stream_s`, which arrives at `now_s`."""
         self._promptest += CLOCKS_DIFFER * max(0.0, stream_s - self._last_s)
         self._promptest = min(self._promptest, now_s - stream_s)
         self._last_s = stream_s
@@ -51,20 +51,20 @@ class StreamClock:
 
     _begin_ns: int | None = None
     """Wall clock of the stream's time 0, nanoseconds since 1970."""
-    _is_told: bool = False
+    _has_reported: bool = False
 
     def learn(self, packet: Packet[Any]) -> None:
         """Take what a packet says of the wall clock, if it says anything."""
         from av.packet import PacketSideData
 
-        told = bytes(PacketSideData.from_packet(packet, "prft"))
-        if len(told) < WALL_CLOCK_US.size or packet.pts is None:
+        reference_time = bytes(PacketSideData.from_packet(packet, "prft"))
+        if len(reference_time) < WALL_CLOCK_US.size or packet.pts is None:
             return
-        # FFmpeg's parser ends a picture at the first piece of the next one: the first time that is told is that one's.
-        if self._is_told:
-            (wall_us,) = WALL_CLOCK_US.unpack_from(told)
+        # FFmpeg's parser ends a picture at the first piece of the next one, to which the first report belongs.
+        if self._has_reported:
+            (wall_us,) = WALL_CLOCK_US.unpack_from(reference_time)
             self._begin_ns = wall_us * 1000 - _nanoseconds(packet.pts, packet.time_base)
-        self._is_told = True
+        self._has_reported = True
 
     def taken_ns(self, pts: int | None, time_base: Fraction | None) -> int | None:
         """Return when a picture of this time of the stream was taken, ns since 1970; None if nothing was reported."""

@@ -1,4 +1,4 @@
-"""How much later one clip began than another: what moves in the places that both cameras see, moves at one time.
+"""Time offset of two clips, by correlation of what moves in the places that both cameras see.
 
 A coarse view of these places is divided into cells. How much each changes from one frame to the next is a signal for
 each camera; what changes in all cells at once is taken out, since encoders refresh whole frames in a rhythm of their
@@ -36,7 +36,7 @@ PEAK_STEPS = 2
 
 @dataclass(frozen=True)
 class OffsetEstimate:
-    """What the clips say of an offset. `second_s`: of the first camera's time at the second one's 0, None if unclear.
+    """Estimated offset of two clips. `second_s`: the first camera's time at the second one's 0, None if unclear.
 
     `strength`: how alike the changes are at the best lag, -1 to 1; `rival`: at the best other one.
     """
@@ -49,7 +49,7 @@ class OffsetEstimate:
 
 @dataclass(frozen=True)
 class MotionSignal:
-    """How much each cell of the coarse view changes: `change` (frames, cells) at `times` (frames,); `seen` (cells,)."""
+    """Change of each cell of the coarse view: `change` (frames, cells) at `times` (frames,); `seen` (cells,)."""
 
     times: Array
     change: NDArray[np.float32]
@@ -69,7 +69,7 @@ class CoarseView:
         self._size = {camera.id: camera.intrinsics.size for camera in cameras}
 
     def motion(self, camera: str, shots: Iterable[ClipPicture]) -> MotionSignal:
-        """What moves in a camera's pictures."""
+        """Return the motion signal of a camera's pictures."""
         width, _ = self._size[camera]
         scale = min(1.0, FRAME_WIDTH / width)
         at = (np.nan_to_num((self._at[camera] + 0.5) * scale - 0.5, nan=-1e3)).astype(np.float32)
@@ -90,12 +90,12 @@ class CoarseView:
         return MotionSignal(np.array(times), np.array(changes, np.float32).reshape(-1, cells), (share.ravel() > 0.5))
 
     def common(self, first: str, second: str) -> int:
-        """How many pixels of the coarse view both see."""
+        """Return the number of pixels of the coarse view that both see."""
         return int((self._within[first] & self._within[second]).sum())
 
 
 def estimate_offset(first: MotionSignal, second: MotionSignal) -> OffsetEstimate:
-    """When the second clip began, in the time of the first one."""
+    """Estimate when the second clip began, in the time of the first one."""
     both = first.seen & second.seen
     if both.sum() < LEAST_CELLS:
         return OffsetEstimate(None, 0.0, 0.0, "the cameras see no places in common")
@@ -114,7 +114,7 @@ def estimate_offset(first: MotionSignal, second: MotionSignal) -> OffsetEstimate
 
 
 def _signal(motion: MotionSignal, cells: NDArray[np.bool_], step: float) -> Array | None:
-    """The changes (times, cells) in even steps, less what all cells have in common; None where nothing moves."""
+    """Return the changes (times, cells) in even steps, less what all cells share, or None if nothing moves."""
     grid = np.arange(motion.times[0], motion.times[-1], step)
     change = np.stack([np.interp(grid, motion.times, of_cell) for of_cell in motion.change[:, cells].T], axis=-1)
     own = change - np.median(change, axis=1, keepdims=True)
@@ -123,7 +123,7 @@ def _signal(motion: MotionSignal, cells: NDArray[np.bool_], step: float) -> Arra
 
 
 def _likeness(one: Array, other: Array, lag: int) -> float:
-    """Correlation of two signals (times, cells), the other one's time `lag` steps later."""
+    """Return the correlation of two signals (times, cells), the other one's time `lag` steps later."""
     begin, end = max(0, lag), min(len(one), len(other) + lag)
     if end - begin < 2:
         return 0.0
@@ -154,7 +154,7 @@ def _peak(likeness: Array, offsets: Array) -> OffsetEstimate:
 
 
 def _pooled(values: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Means (h, w) of the cells of values (H, W)."""
+    """Return the means (h, w) of the cells of values (H, W)."""
     height, width = values.shape
     cells = values.reshape(height // CELL, CELL, width // CELL, CELL)
     return np.asarray(cells.mean(axis=(1, 3)), np.float32)
@@ -163,7 +163,7 @@ def _pooled(values: NDArray[np.float32]) -> NDArray[np.float32]:
 def chain_offsets(
     places: CoarseView, motions: Mapping[str, MotionSignal], known: Mapping[str, float]
 ) -> tuple[dict[str, float], dict[str, OffsetEstimate]]:
-    """When each camera's clip began, in the time of those `known`, and what was found of those that were not.
+    """Return when each camera's clip began, in the time of those `known`, and the estimates of the others.
 
     Each camera is put in time by the one of those already in time with which it has most in common.
     """

@@ -20,21 +20,21 @@ from worker.calibration.tracking.follower import CameraTracker, How, TrackedMome
 from worker.video.errors import VideoError
 from worker.video.yuv_planes import Picture
 
-# Poses are told when so many seconds more have been seen.
+# Seconds of pictures that are seen before the pose of a moment is reported.
 LOOK_AHEAD_S = 1.0
 Keep = Callable[[TrackedMoment, Fraction], None]
 
 
 @dataclass
 class MotionSummary:
-    """What was seen of a camera: in how many pictures of the clip it was known how, and how far it turned."""
+    """Motion of a camera in a clip: pictures by how its pose was known, and its farthest turn."""
 
     how: Counter[How] = field(default_factory=Counter)
     farthest_deg: float = 0.0
 
 
 class TrackedGeometryFactory:
-    """Makes the geometry of a clip whose cameras move, and tells their poses. One for each clip.
+    """Makes the geometry of a clip whose cameras move, and reports their poses. One for each clip.
 
     `every`: lines are measured in every so many-th picture; `keep`: takes each moment of the clip, and its rate.
     `motions`: of each camera, so far.
@@ -51,16 +51,16 @@ class TrackedGeometryFactory:
     def __call__(
         self, pitch: Field, view: StitchedView, cameras: Sequence[Camera], lights: Mapping[str, Light], rate: Fraction
     ) -> _TrackedGeometry:
-        """The geometry of these cameras."""
-        self._moving = _TrackedGeometry(pitch, view, cameras, lights, rate, self._every, self._told)
+        """Return the geometry of these cameras."""
+        self._moving = _TrackedGeometry(pitch, view, cameras, lights, rate, self._every, self._note)
         return self._moving
 
     def finish(self) -> None:
-        """Tell the last moments: after the last picture."""
+        """Report the last moments, after the last picture."""
         if self._moving is not None:
             self._moving.finish()
 
-    def _told(self, moment: TrackedMoment, references: Sequence[Camera], rate: Fraction) -> None:
+    def _note(self, moment: TrackedMoment, references: Sequence[Camera], rate: Fraction) -> None:
         for reference, now in zip(references, moment.cameras, strict=True):
             motion = self.motions.setdefault(reference.id, MotionSummary())
             motion.how[now.how] += 1
@@ -80,26 +80,26 @@ class _TrackedGeometry:
     lights: Mapping[str, Light]
     rate: Fraction
     every: int
-    told: Callable[[TrackedMoment, Sequence[Camera], Fraction], None]
+    report: Callable[[TrackedMoment, Sequence[Camera], Fraction], None]
     _follower: CameraTracker | None = field(default=None, init=False)
     _panoramas: dict[frozenset[str], MovingPanorama] = field(default_factory=dict, init=False)
 
     def at(self, number: int, pictures: Mapping[str, Picture]) -> Panorama:  # noqa: ARG002
-        """The panorama of the next pictures, of the cameras that have one."""
+        """Return the panorama of the next pictures, of the cameras that have one."""
         if self._follower is None:
-            self._follower = self._begun(pictures)
+            self._follower = self._start_tracking(pictures)
         else:
-            looked = pictures if self._follower.looks else {}
-            self._follower.see(looked)
-        self._tell(self._follower, self._follower.settled())
+            measured = pictures if self._follower.looks else {}
+            self._follower.see(measured)
+        self._report(self._follower, self._follower.settled())
         return self._panorama(self._follower, frozenset(pictures))
 
     def finish(self) -> None:
-        """Tell what is left to be told."""
+        """Report the moments that were not reported yet."""
         if self._follower is not None:
-            self._tell(self._follower, self._follower.rest())
+            self._report(self._follower, self._follower.rest())
 
-    def _begun(self, pictures: Mapping[str, Picture]) -> CameraTracker:
+    def _start_tracking(self, pictures: Mapping[str, Picture]) -> CameraTracker:
         seen = [camera for camera in self.cameras if camera.id in pictures]
         first = {camera.id: pictures[camera.id].colours for camera in seen}
         ahead = round(LOOK_AHEAD_S * self.rate)
@@ -118,6 +118,6 @@ class _TrackedGeometry:
             self._panoramas[shown] = MovingPanorama(self.pitch, self.view, still, self.lights)
         return self._panoramas[shown].at([now[camera] for camera in ids])
 
-    def _tell(self, follower: CameraTracker, moments: Sequence[TrackedMoment]) -> None:
+    def _report(self, follower: CameraTracker, moments: Sequence[TrackedMoment]) -> None:
         for moment in moments:
-            self.told(moment, follower.references, self.rate)
+            self.report(moment, follower.references, self.rate)

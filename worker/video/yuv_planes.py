@@ -35,7 +35,7 @@ LUMA_LEVELS = 219
 
 
 def _to_planes() -> Array:
-    """Luma and both chroma of blue, green, red, 1: (3, 4)."""
+    """Return the matrix (3, 4) from blue, green, red, 1 to luma and both chroma."""
     luma = np.array(LUMA_SHARES)
     blue, _, red = LUMA_SHARES
     of_blue = (np.array([1.0, 0, 0]) - luma) / (2 * (1 - blue))
@@ -45,7 +45,7 @@ def _to_planes() -> Array:
 
 
 def _from_planes(to_planes: Array) -> Array:
-    """Blue, green, red of luma, chroma, 1: (3, 4)."""
+    """Return the matrix (3, 4) from luma, both chroma, 1 to blue, green, red."""
     inverse = np.linalg.inv(to_planes[:, :3])
     return np.column_stack([inverse, -inverse @ to_planes[:, 3]])
 
@@ -56,7 +56,7 @@ FROM_PLANES = _from_planes(TO_PLANES)
 
 @dataclass(frozen=True)
 class Picture:
-    """A frame of a clip, in the form of this room."""
+    """A frame of a clip: yuv420p in BT.709, limited range."""
 
     frame: av.VideoFrame
 
@@ -84,7 +84,7 @@ class Picture:
         return np.asarray(shown.to_ndarray(), np.uint8)
 
     def read(self, channel: int, column: NDArray[np.float32], row: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Brightness (P, N) 0..255 in one channel at columns and rows (P, N), NaN outside; the rest is not converted.
+        """Return the brightness (P, N) 0..255 of one channel at columns and rows (P, N), NaN outside the picture.
 
         A `worker.calibration.detection.contrast.PixelReader`.
         """
@@ -103,7 +103,7 @@ class Picture:
 
 
 def picture_of(frame: av.VideoFrame) -> Picture:
-    """A decoded frame of any format as this room has it."""
+    """Return a decoded frame of any format as yuv420p in BT.709."""
     matrix = _matrix(frame)
     full = frame.color_range == RANGE_FULL or frame.format.name.startswith("yuvj")
     if frame.format.name == "yuv420p" and matrix == BT709 and not full:
@@ -121,14 +121,14 @@ def picture_of(frame: av.VideoFrame) -> Picture:
 
 
 def _matrix(frame: av.VideoFrame) -> int:
-    told = int(frame.colorspace)
-    if told != UNTOLD:
-        return told
+    matrix = int(frame.colorspace)
+    if matrix != UNTOLD:
+        return matrix
     return BT601 if frame.height <= PAL_ROWS else BT709
 
 
 def planes_of(frame: av.VideoFrame) -> tuple[Plane, Plane, Plane]:
-    """The memory of a frame of format yuv420p: luma (H, W) and both chroma (H/2, W/2), rounded up."""
+    """Return views into a yuv420p frame: luma (H, W) and both chroma (H/2, W/2), rounded up."""
     luma, blue, red = (_view(plane) for plane in frame.planes)
     return luma, blue, red
 

@@ -33,7 +33,7 @@ class Capture:
     shrunk: float
 
     def seen(self, light: Plane) -> Plane:
-        """What falls on the sensor, noise apart."""
+        """Return the light that falls on the sensor, without noise."""
         for effect in self.optics:
             light = effect(light)
         return np.clip(light, 0, 1)

@@ -1,4 +1,4 @@
-"""What stands in front of the lines or beside them and is none: people, posts, nets, wires, boards, crowds, letters."""
+"""Clutter in front of the lines or beside them: people, posts, nets, wires, boards, crowds, letters."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def draw_clutter(rng: np.random.Generator, picture: Plane, hidden: Plane, scale:
 
 
 def backdrop(rng: np.random.Generator, size: int) -> Plane:
-    """What is behind the ground (size, size, 3): crowd, wall, fence, stand, trees, sky."""
+    """Draw a random background behind the ground (size, size, 3): crowd, wall, fence, stand, trees, sky."""
     base = np.empty((size, size, 3), np.float32)
     base[...] = random_colour(rng, 0.15)
     kind = rng.choice(["crowd", "wall", "boxes", "trees"])

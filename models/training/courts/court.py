@@ -82,7 +82,7 @@ def render_court(pitch: Field, camera: Camera, rng: np.random.Generator, floor: 
 
 @dataclass(frozen=True)
 class Subject:
-    """What is in a picture, and how it is drawn at random what is open of it.
+    """The contents of a picture, and random choices for all that they leave open.
 
     `paints`: the colours of paint by their numbers, on a ground of some colour.
     """
@@ -347,7 +347,7 @@ def _lit(rng: np.random.Generator, patch: Patch, pictures: Plane) -> Plane:
 
 
 def _cast_shadows(rng: np.random.Generator, size: tuple[int, int]) -> Plane:
-    """What people take off the light (H, W), 0..1: short dark streaks, all one way, that are no lines."""
+    """Draw shadows of people, as the share 0..1 of the light that they take (H, W): short dark streaks, all one way."""
     streaks = np.zeros(size, np.float32)
     way, strength = rng.uniform(0, 180), float(rng.uniform(0.25, 0.7))
     for _ in range(rng.integers(1, 7)):

@@ -1,4 +1,4 @@
-"""What is painted on a ground that exists nowhere: fields of all sports, one over another, or lines of no sport."""
+"""Random layouts of paint on made-up grounds: fields of all sports, one over another, or lines of no sport."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Stripe:
 
 @dataclass(frozen=True)
 class Layout:
-    """Everything painted on a ground, metres; `half`: half the length and width of the largest field."""
+    """The paint on a ground, metres; `half`: half the length and width of the largest field."""
 
     stripes: tuple[Stripe, ...]
     half: NDArray[np.float64]
@@ -67,7 +67,7 @@ def field_layout(pitch: Field) -> tuple[Layout, list[str]]:
 
 
 def shape_width(shape: Line | Arc | Spot) -> float:
-    """Of the paint; of a spot its diameter."""
+    """Return the width of a shape's paint, or the diameter of a spot, m."""
     return shape.diameter if isinstance(shape, Spot) else shape.width
 
 

@@ -1,4 +1,4 @@
-"""Who looks at a court: a pinhole of its own for a crop, or a camera of the engine for a whole frame."""
+"""Views of a court: a pinhole camera for a crop, or a camera of the engine for a whole frame."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from worker.calibration.geometry.field import Field
 
 
 class View(Protocol):
-    """Where places on the ground are in a square picture, and which place each pixel shows."""
+    """Projection between the ground and a square picture, both ways."""
 
     @property
     def focal(self) -> float:
@@ -24,7 +24,7 @@ class View(Protocol):
         """Pixels (n, 2) and depths (n,) of points (n, 2) on the ground; a depth of 0 or less is not in sight."""
 
     def patch(self, size: int) -> Patch:
-        """Where the pixels of a picture of `size` px look on the ground."""
+        """Return the places on the ground that the pixels of a picture of `size` px show."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Window:
         return self.pivot + away * (1 + self.bend * (away**2).sum(axis=1, keepdims=True)), depth
 
     def patch(self, size: int) -> Patch:
-        """Where pixels look on the ground, the bend left out."""
+        """Return the places on the ground that pixels show, without distortion."""
         row, column = np.mgrid[0:size, 0:size].astype(np.float32)
         rays = np.stack([(column - self.principal[0]), (row - self.principal[1]), np.full_like(row, self.focal)], -1)
         rays = rays @ self.rotation
@@ -77,5 +77,5 @@ class FieldView:
         return pixel, np.where(np.isfinite(pixel).all(axis=1), depth, 0.0)
 
     def patch(self, size: int) -> Patch:
-        """Where pixels look on the field and the ground around it."""
+        """Return the places on the field, and on the ground around it, that pixels show."""
         return ground_patch(self.pitch, None, self.camera.pose.position, window_rays(self.camera, (0, 0, size, size)))

@@ -1,1 +1,1 @@
-"""What the network eats: crops made as fast as they are learnt, kept where it computes, and altered each time."""
+"""Training data of the network: crops that are rendered during training, kept on its device and augmented."""

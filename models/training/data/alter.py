@@ -1,4 +1,4 @@
-"""The same crops, never twice alike: turned, mirrored, cut, sheared and scaled.
+"""Augmentation of crops: turned, mirrored, cut, sheared and scaled.
 
 Everything is computed for the whole batch where the batch lies: on a GPU it costs nothing beside the training. Colours,
 light and noise stay as they were rendered, because what can be seen of a line depends on them, and the target says so.

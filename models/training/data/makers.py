@@ -62,7 +62,7 @@ class Makers:
                     raise RuntimeError("no process makes crops any more: see above what ended them") from None
 
     def made(self) -> list[Planes]:
-        """All that wait."""
+        """Return all crops that are waiting."""
         packs = []
         while True:
             try:

@@ -1,1 +1,1 @@
-"""What both kinds of rendering paint with: colours, noise fixed to places in the world, letters."""
+"""Shared parts of both kinds of rendering: colours, noise fixed to places in the world, letters."""

@@ -21,7 +21,7 @@ TEXTURE_SIZE = 256
 
 @dataclass(frozen=True)
 class Patch:
-    """Where the pixels of a window look on one surface.
+    """The places on one surface that the pixels of a window show.
 
     `x`, `y` (H, W): metres along the surface's two axes; `depth` (H, W): metres from the camera; `seen` (H, W): whether
     the pixel meets the surface at all. Unseen pixels hold finite numbers without meaning.
@@ -55,7 +55,7 @@ class Patch:
         return np.hypot(a * nx + c * ny, b * nx + d * ny) + np.float32(1e-6)
 
     def part(self, rows: slice, columns: slice) -> Patch:
-        """The same for a rectangle of the window."""
+        """Return the patch of a rectangle of the window."""
         return Patch(self.x[rows, columns], self.y[rows, columns], self.depth[rows, columns], self.seen[rows, columns])
 
 

@@ -50,7 +50,7 @@ def quantise(exported: Path, path: Path, crops: int = CROPS) -> dict[str, object
 
 
 class RenderedCrops(CalibrationDataReader):
-    """What activations are like, on rendered crops: courts and pitches in turn."""
+    """Calibration data for the ranges of activations: rendered crops, courts and pitches in turn."""
 
     def __init__(self, name: str, count: int) -> None:
         self._name = name

@@ -8,14 +8,14 @@ import torch
 from torch import Tensor, nn
 
 LEAK = 0.01
-# Of typical frames, red green blue in 0..1.
+# Mean and deviation of typical frames, red green blue in 0..1.
 MEAN = (0.40, 0.45, 0.36)
 SPREAD = (0.24, 0.22, 0.24)
 
 
 @dataclass(frozen=True)
 class Shape:
-    """How large a U-Net is: filters per level, and the side in pixels of the blocks that the first level sees as one.
+    """Size of a U-Net: filters per level, and the side in pixels of the blocks that the first level sees as one.
 
     Blocks of one pixel are the paper's. Blocks of two put four pixels into the channels (space to depth) and the answer
     back into pixels (depth to space): nothing is lost, and the level with the most pixels and the fewest filters, on

@@ -1,4 +1,4 @@
-"""What stands behind the pitch: sky and clouds, buildings, trees, stands, fences, boards and hoardings.
+"""The background of the pitch: sky and clouds, buildings, trees, stands, fences, boards and hoardings.
 
 A wall is a plane with a texture in metres along it and in metres of height; it hides what is farther away.
 """

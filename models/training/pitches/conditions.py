@@ -1,4 +1,4 @@
-"""What a rendering is asked to show: light, weather, state of the pitch, people, lens."""
+"""Conditions of a rendering: light, weather, state of the pitch, people, lens."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class Conditions:
 
     @classmethod
     def named(cls, name: str, rng: np.random.Generator) -> Conditions:
-        """One of `NAMED`; whatever it does not name is random, but fair."""
+        """Return one of `NAMED`; conditions that it does not name are random within fair weather."""
         fair = {"long_shadows": 0.0, "rain": 0.0, "fog": 0.0, "snow": 0.0, "wear": 0.15}
         return replace(cls.random(rng), **{**fair, **NAMED[name]})
 

@@ -1,4 +1,4 @@
-"""What stands on the ground in front of it all: players, their shadows, balls, goals with nets, flags, benches.
+"""Objects on the ground in front of the camera: players, their shadows, balls, goals with nets, flags, benches.
 
 Everything is drawn as anti-aliased polygons on 8-bit pictures, farthest first. What is opaque covers the labels too.
 """
@@ -38,7 +38,7 @@ class Canvas:
         return self.camera.project(points) - np.array(self.origin)
 
     def near(self, starts: Array, ends: Array, reach: float) -> NDArray[np.bool_]:
-        """Which of N things between world points (N, 3) and (N, 3) may show within `reach` metres of them."""
+        """Return which of N things between world points (N, 3) and (N, 3) may be seen within `reach` metres of them."""
         if len(starts) == 0:
             return np.zeros(0, dtype=bool)
         first, last = self.project(starts), self.project(ends)

@@ -25,7 +25,7 @@ def expose(
     size: tuple[int, int],
     rng: np.random.Generator,
 ) -> NDArray[np.uint8]:
-    """What the camera delivers of a window at `origin` of a frame of `size` (width, height).
+    """Return the picture that the camera delivers of a window at `origin` of a frame of `size` (width, height).
 
     How the lens and the electronics behave hangs on the world's seed; only the noise hangs on `rng`.
     """

@@ -93,7 +93,7 @@ def _weights(count: int, nodes: int) -> Plane:
 
 
 def ground_patch(pitch: Field, world: World | None, centre: Plane, rays: Plane) -> Patch:
-    """Where rays (H, W, 3) from `centre` (3,) meet the roof, or the plane z = 0 around it."""
+    """Return the places where rays (H, W, 3) from `centre` (3,) meet the roof, or the plane z = 0 around it."""
     dx, dy, dz = (rays[..., i].astype(np.float64) for i in range(3))
     cx, cy, cz = (float(v) for v in centre)
     down = dz < -cz / FARTHEST_M

@@ -1,4 +1,4 @@
-"""What stays at its place around one pitch: turf, paint, belts, walls, lettering, sun.
+"""The fixed surroundings of one pitch: turf, paint, belts, walls, lettering, sun.
 
 A world hangs on its seed alone: the same seed gives the same wear, lettering, trees and players at the same places,
 whoever looks.
@@ -50,7 +50,7 @@ class Wall:
 
 @dataclass(frozen=True)
 class World:
-    """Everything that stays at its place around one pitch."""
+    """The fixed surroundings of one pitch."""
 
     grass: tuple[Colour, Colour]
     soil: Colour
@@ -180,7 +180,7 @@ def _zones(rng: np.random.Generator, grass: Colour) -> tuple[Zone, ...]:
 
 
 def _walls(rng: np.random.Generator) -> tuple[Wall, ...]:
-    """What stands around the pitch, on every side from far to near."""
+    """Draw random walls around the pitch, on every side from far to near."""
     heights = {
         "building": (4, 15, 0.0),
         "trees": (4, 16, 0.0),

@@ -18,6 +18,7 @@ from service.schemas.history import Cause
 from service.schemas.job import JobError, Progress
 from service.schemas.names import JobKind
 from service.schemas.options import Options
+from service.schemas.refusals import refuse
 from service.schemas.results import AnyResult, Result
 from service.schemas.venue import Venue
 from service.store import tables
@@ -227,7 +228,7 @@ def _move_poses(
     if stored is None or not stored.venue.has_same_calibration_input_as(task.venue):
         if not result.accepted_cameras:
             return result
-        return result.refused("the venue was changed while the job ran", "venue-changed")
+        return refuse(result, "the venue was changed while the job ran", "venue-changed")
     held = [] if task.options.dry_run else result.accepted_cameras
     quality.calibrated(result, moved=bool(held))
     if held:

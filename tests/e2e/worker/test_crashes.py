@@ -2,13 +2,11 @@
 
 import os
 import signal
-import socket
 import time
 
 from service.serving import GRACE_S
 from tests.disks import filled
 from tests.e2e.books import settle
-from tests.e2e.commands import esc_process
 from tests.e2e.killing import (
     chance,
     kill_api,
@@ -50,11 +48,11 @@ def test_a_killed_worker_comes_back_and_its_job_ends_once(start):
 
 
 @in_both_homes
-def test_a_worker_on_another_machine_takes_over(start, tmp_path):
+def test_a_worker_on_another_machine_takes_over(start, worker_beside):
     silence_s = 3
     service = start("serve", ESC_TAKEOVER_AFTER_S=str(silence_s))
     service.venue("v", "accept 3")
-    workers = [service.worker_beside(tmp_path / f"machine-{number}", f"worker-{number}") for number in (1, 2)]
+    workers = [worker_beside(service, f"worker-{number}") for number in (1, 2)]
     service.ready()
     job = service.submitted("v")
     service.running(job)
@@ -70,9 +68,6 @@ def test_a_worker_on_another_machine_takes_over(start, tmp_path):
     assert poses(service, "v") == [-0.875, -0.875]
     history = service.http.get("/venues/v/history").json()["revisions"]
     assert [revision["cause"] for revision in history] == ["calibrated", "put"]
-    for process in workers:
-        process.kill()
-        process.wait()
 
 
 @in_both_homes
@@ -100,16 +95,11 @@ def test_a_submission_killed_at_any_moment_is_one_job_or_none(start):
     settle(service)
 
 
-def test_two_workers_of_one_name_do_not_run_on_one_machine(service):
-    second = esc_process(service.data, "worker", "--name", socket.gethostname(), **service.environment)
-    assert second.returncode == 2
-    assert "already runs" in second.stderr
-
-
 def test_a_killed_service_leaves_no_process_and_goes_on_when_it_is_back(start):
     service = start(cold=True).ready()
     job = service.submitted(service.venue("v", "accept 2"))
     service.running(job)
+    waiting = service.submitted(service.venue("w"))
     worker = service.worker()
     (computing,) = service.begun(job)
     service.kill()
@@ -117,16 +107,8 @@ def test_a_killed_service_leaves_no_process_and_goes_on_when_it_is_back(start):
     service.start()
     ended = service.end(job)
     assert (ended["status"], ended["attempt"]) == ("succeeded", 2)
-    assert poses(service, "v") == [-0.875, -0.875]
-
-
-def test_a_job_whose_202_arrived_survives_the_kill_of_everything(start):
-    service = start().ready()
-    job = service.submitted(service.venue("v"))
-    service.kill()
-    service.start()
-    assert service.end(job)["status"] == "succeeded"
-    assert poses(service, "v") == [-0.875, -0.875]
+    assert service.end(waiting)["status"] == "succeeded"
+    assert poses(service, "v") == poses(service, "w") == [-0.875, -0.875]
 
 
 def test_a_service_that_is_asked_to_stop_does_so_whoever_still_waits(start):
@@ -188,10 +170,10 @@ def test_while_the_database_is_away_the_service_says_so_and_a_job_goes_on(start,
 
 
 @on_servers
-def test_a_long_absence_of_the_database_is_no_workers_death(start, home, tmp_path):
+def test_a_long_absence_of_the_database_is_no_workers_death(start, home, worker_beside):
     silence_s = 3
     service = start("up", ESC_TAKEOVER_AFTER_S=str(silence_s)).ready()
-    other = service.worker_beside(tmp_path / "other", "other")
+    worker_beside(service, "other")
     wait_for(lambda: '"other"' in (service.data / "log").read_text())
     job = service.submitted(service.venue("v", "accept 7"))
     service.running(job)
@@ -199,8 +181,6 @@ def test_a_long_absence_of_the_database_is_no_workers_death(start, home, tmp_pat
         time.sleep(silence_s + 2)
     ended = service.end(job)
     assert (ended["status"], ended["attempt"]) == ("succeeded", 1)
-    other.kill()
-    other.wait()
 
 
 def test_a_job_that_kills_its_worker_is_given_up_after_three_attempts(start):

@@ -32,28 +32,13 @@ def unreadable(service):
     return sum(sample.value for sample in families(service)["esc_worker_unreadable_jobs"].samples)
 
 
-@pytest.fixture
-def begin(tmp_path):
-    """Start workers beside a service."""
-    begun = []
-
-    def begin(service, name):
-        begun.append(service.worker_beside(tmp_path / name, name))
-        return begun[-1]
-
-    yield begin
-    for worker in begun:
-        worker.kill()
-        worker.wait()
-
-
 @in_both_homes
-def test_a_job_with_options_of_a_newer_version_waits_for_a_worker_of_that_version(start, begin):
+def test_a_job_with_options_of_a_newer_version_waits_for_a_worker_of_that_version(start, worker_beside):
     service = start("serve")
     newer, plain = (service.submitted(service.venue(name)) for name in ("newer", "plain"))
     asked = options_of(service, newer)
     changed(service, newer, options=asked | {"zoom": "fit"})
-    worker = begin(service, "first")
+    worker = worker_beside(service, "first")
     # The others go on.
     assert service.end(plain)["status"] == "succeeded"
     wait_for(lambda: unreadable(service) == 1)
@@ -65,61 +50,48 @@ def test_a_job_with_options_of_a_newer_version_waits_for_a_worker_of_that_versio
     assert worker.poll() is None
     # A worker that can read it, which is what another one is once the option is gone, takes it.
     changed(service, newer, options=asked)
-    begin(service, "second")
+    worker_beside(service, "second")
     end = service.end(newer)
     assert (end["status"], end["attempt"]) == ("succeeded", 1)
     assert service.calibrated("newer", shade=1)["status"] == "succeeded"
     wait_for(lambda: unreadable(service) == 0)
 
 
-def test_a_job_that_no_worker_can_read_can_be_cancelled(start):
+def test_a_job_that_no_worker_can_read_can_be_cancelled_and_its_frames_are_not_submitted_again_otherwise(start):
     service = start("serve")
     job = service.submitted(service.venue("newer"))
     changed(service, job, options=options_of(service, job) | {"zoom": "fit"}, kind="zooming")
     assert service.job(job)["kind"] == "zooming"
     assert service.http.post(f"/jobs/{job}/cancel").json()["status"] == "cancelled"
-
-
-def test_the_frames_of_a_job_of_a_newer_version_are_not_submitted_again_otherwise(start):
-    service = start("serve")
-    job = service.submitted(service.venue("newer"))
-    service.http.post(f"/jobs/{job}/cancel").raise_for_status()
-    changed(service, job, options=options_of(service, job) | {"zoom": "fit"})
+    changed(service, job, kind="calibration")
     answer = service.http.post(f"/jobs/{job}/again")
     assert (answer.status_code, answer.json()["type"]) == (409, "/problems/job-of-newer-version")
     assert "zoom" in answer.json()["detail"]
 
 
-def test_a_job_that_a_worker_broke_off_before_it_began_is_put_back(start, begin):
+def test_a_job_that_a_worker_broke_off_before_it_began_is_put_back(start, worker_beside):
     """As one of 0.1.0 does with a job that it cannot read."""
     service = start("serve")
     broken = service.submitted(service.venue("broken"))
     with service.database() as connection:
         connection.exec_driver_sql("UPDATE workflow_status SET status = 'ERROR'")
-    begin(service, "worker")
+    worker_beside(service, "worker")
     end = service.end(broken)
     assert (end["status"], end["attempt"]) == ("succeeded", 1)
 
 
 @pytest.mark.parametrize("given_up", ["MAX_RECOVERY_ATTEMPTS_EXCEEDED", "CANCELLED"])
-def test_one_job_whose_rows_are_broken_does_not_keep_another_from_its_end(start, begin, given_up):
+def test_one_job_whose_rows_are_broken_does_not_keep_another_from_its_end(start, worker_beside, given_up):
     service = start("serve")
-    first, second = (service.submitted(service.venue(name)) for name in ("first", "second"))
+    first, second, of_broken_venue = (service.submitted(service.venue(name)) for name in ("first", "second", "third"))
     changed(service, first, options={})
     with service.database() as connection:
+        broken = sa.update(tables.venues).where(tables.venues.c.id == "third")
+        connection.execute(broken.values(document={"no": "venue"}))
         connection.exec_driver_sql(f"UPDATE workflow_status SET status = '{given_up}'")
-    begin(service, "worker")
-    assert service.end(second)["error"]["type"] == "/problems/job-abandoned"
+    worker_beside(service, "worker")
+    for job in (second, of_broken_venue):
+        assert service.end(job)["error"]["type"] == "/problems/job-abandoned"
     assert service.job(first)["status"] == "queued"
     time.sleep(2 * TAKEOVER_S)
     assert log_of(service).count("cannot end or begin a job that the queue has given up") == 1
-
-
-def test_a_job_of_a_venue_whose_document_is_broken_comes_to_its_end(start, begin):
-    service = start("serve")
-    job = service.submitted(service.venue("broken"))
-    with service.database() as connection:
-        connection.execute(sa.update(tables.venues).values(document={"no": "venue"}))
-        connection.exec_driver_sql("UPDATE workflow_status SET status = 'CANCELLED'")
-    begin(service, "worker")
-    assert service.end(job)["error"]["type"] == "/problems/job-abandoned"

@@ -3,6 +3,8 @@
 import socket
 import time
 
+import pytest
+
 from service.store.database import connect
 from service.store.workers import WorkerRepository
 from tests.e2e.commands import esc_process
@@ -16,9 +18,9 @@ AT_ONCE_S = 15
 
 
 @in_both_homes
-def test_a_worker_that_is_stopped_lets_its_job_end_and_takes_no_other(start, tmp_path):
+def test_a_worker_that_is_stopped_lets_its_job_end_and_takes_no_other(start, worker_beside):
     service = start("serve")
-    worker = service.worker_beside(tmp_path / "machine", "w")
+    worker = worker_beside(service, "w")
     running = service.submitted(service.venue("v", "accept 2"))
     service.running(running)
     waiting = service.submitted(service.venue("w"))
@@ -30,12 +32,12 @@ def test_a_worker_that_is_stopped_lets_its_job_end_and_takes_no_other(start, tmp
 
 
 @in_both_homes
-def test_stops_in_the_middle_of_a_job_do_not_count_as_its_attempts(start, tmp_path):
+def test_stops_in_the_middle_of_a_job_do_not_count_as_its_attempts(start, worker_beside):
     service = start("serve", ESC_DRAIN_S="0")
     job = service.submitted(service.venue("v", "accept 3"))
     # More often than the queue begins a job whose worker has died.
     for _ in range(4):
-        worker = service.worker_beside(tmp_path / "machine", "w")
+        worker = worker_beside(service, "w")
         service.running(job)
         (computing,) = [process for process in service.begun(job) if alive(process)]
         worker.terminate()
@@ -43,18 +45,16 @@ def test_stops_in_the_middle_of_a_job_do_not_count_as_its_attempts(start, tmp_pa
         state = service.job(job)
         assert (state["status"], state["attempt"], state["started_at"]) == ("queued", 0, None)
         wait_for(lambda process=computing: not alive(process))
-    worker = service.worker_beside(tmp_path / "machine", "w")
+    worker_beside(service, "w")
     ended = service.end(job)
     assert (ended["status"], ended["attempt"]) == ("succeeded", 1)
     assert poses(service, "v") == [-0.875, -0.875]
     assert figures(service)["esc_job_restarts_total",] == 0
-    worker.kill()
-    worker.wait()
 
 
-def test_a_worker_that_is_asked_twice_to_stop_does_not_wait_for_its_job(start, tmp_path):
+def test_a_worker_that_is_asked_twice_to_stop_does_not_wait_for_its_job(start, worker_beside):
     service = start("serve")
-    worker = service.worker_beside(tmp_path / "machine", "w")
+    worker = worker_beside(service, "w")
     job = service.submitted(service.venue("v", "hang"))
     service.running(job)
     worker.terminate()
@@ -78,12 +78,12 @@ def test_poses_that_were_found_hold_though_their_pictures_cannot_be_stored(start
 
 
 @in_both_homes
-def test_two_workers_of_one_name_do_not_run_on_two_machines(start, tmp_path):
+def test_two_workers_of_one_name_do_not_run_on_two_machines(start, worker_beside):
     service = start("serve", ESC_TAKEOVER_AFTER_S="6")
-    first = service.worker_beside(tmp_path / "one", "truck")
+    first = worker_beside(service, "truck", "one")
     job = service.submitted(service.venue("v", "accept 5"))
     service.running(job)
-    second = service.worker_beside(tmp_path / "two", "truck")
+    second = worker_beside(service, "truck", "two")
     assert second.wait(60) == 2
     assert "A worker called truck already runs elsewhere" in (service.data / "log").read_text()
     ended = service.end(job)
@@ -91,15 +91,13 @@ def test_two_workers_of_one_name_do_not_run_on_two_machines(start, tmp_path):
     # Once the first one is gone, whatever it died of, the name is free.
     first.kill()
     first.wait()
-    third = service.worker_beside(tmp_path / "two", "truck")
+    worker_beside(service, "truck", "two")
     assert service.calibrated("v", 1)["status"] == "succeeded"
-    third.kill()
-    third.wait()
 
 
-def test_a_worker_whose_name_was_taken_while_it_was_away_ends(start, tmp_path):
+def test_a_worker_whose_name_was_taken_while_it_was_away_ends(start, worker_beside):
     service = start("serve")
-    worker = service.worker_beside(tmp_path / "one", "truck")
+    worker = worker_beside(service, "truck", "one")
     service.ready()
     engine = connect(service.database_url)
     WorkerRepository(engine).register("truck", None, "another", "elsewhere")
@@ -108,23 +106,21 @@ def test_a_worker_whose_name_was_taken_while_it_was_away_ends(start, tmp_path):
     assert "another worker of this name has started" in (service.data / "log").read_text()
 
 
-def test_a_second_service_on_one_folder_is_told_so_and_ends(start):
-    service = start().ready()
+@pytest.mark.parametrize("command", [("up", "--port", "0"), ("worker", "--name", socket.gethostname())])
+def test_a_second_worker_of_one_name_on_one_machine_is_told_so_and_ends(service, command):
     worker = service.worker()
-    second = esc_process(service.data, "up", "--port", "0", **service.environment)
+    second = esc_process(service.data, *command, **service.environment)
     assert second.returncode == 2
     assert f"A worker called {socket.gethostname()} already runs on" in second.stderr
     assert "listens" not in second.stdout
     assert service.worker() == worker
 
 
-def test_a_service_whose_worker_has_the_name_of_another_machines_ends(start, tmp_path):
+def test_a_service_whose_worker_has_the_name_of_another_machines_ends(start, worker_beside, tmp_path):
     service = start("serve", ESC_WORKER_NAME="truck")
-    first = service.worker_beside(tmp_path / "one", "truck")
+    worker_beside(service, "truck", "one")
     service.ready()
     home = {"ESC_DATA": str(tmp_path / "two"), "ESC_DATABASE_URL": service.database_url}
     second = esc_process(service.data, "up", "--port", "0", **service.environment | home)
     assert second.returncode == 2
     assert "A worker called truck already runs elsewhere" in second.stderr
-    first.kill()
-    first.wait()

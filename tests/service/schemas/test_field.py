@@ -7,6 +7,7 @@ import pytest
 from pydantic import ValidationError
 
 from fields.landmarks import find
+from fields.plans import other_shapes
 from fields.shapes import Line, Spot
 from fields.template import NAMES, load
 from service.schemas.field import FieldOfPlay
@@ -193,9 +194,10 @@ def test_other_markings_are_fields_of_other_sports_and_markings_one_by_one():
             ]
         }
     )
-    names = [shape.name for shape in field.others]
+    others = other_shapes(field.model_dump()["other_markings"], field.size)
+    names = [shape.name for shape in others]
     assert names[0] == "run-up"
-    (side,) = [shape for shape in field.others if shape.name == "left goal line"]
+    (side,) = [shape for shape in others if shape.name == "left goal line"]
     # Turned by a right angle, its left end is the near one.
     assert {round(y, 1) for _, y in side.points} == {round(5 - 20 + 0.025, 1)}
     assert FieldOfPlay.model_validate(field.model_dump(mode="json")) == field

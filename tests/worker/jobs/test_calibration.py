@@ -7,6 +7,7 @@ from datetime import UTC, datetime
 import cv2
 import numpy as np
 import pytest
+from pydantic import BaseModel
 
 from service.schemas import geometry
 from service.schemas.field import OtherField
@@ -33,8 +34,9 @@ from worker.calibration.refinement.diagnosis import Suspicion
 from worker.calibration.refinement.uncertainty import Sigma
 from worker.calibration.stitching.photometry import Light
 from worker.compute_resources import ComputeResources
-from worker.jobs import calibration, from_schemas, inputs, pictures, program, to_schemas
+from worker.jobs import calibration, from_schemas, pictures, program, to_schemas
 from worker.jobs.calibration import NightHistory
+from worker.jobs.documents import Document
 from worker.jobs.pictures import draw
 from worker.programs.draw import scene_of
 from worker.protocol import Message
@@ -137,7 +139,7 @@ def means(tmp_path):
 
 
 def test_what_the_last_accepted_job_saw_reaches_the_engine(venue, files, asked, means):
-    last = {"left": inputs.View(lines_found=0.9, blur_px=None)}
+    last = {"left": Document(lines_found=0.9, blur_px=None)}
     outcome = solve(venue, files, Options(seed=7), means, lambda _: None, NightHistory(last))
     assert asked["usual"] == {"left": UsualView(0.9, None)}
     assert outcome.result.cameras[0].view.lines_found == 0.8
@@ -212,7 +214,7 @@ def test_the_outcome_is_what_was_found_with_pictures_and_provenance(venue, files
     assert result.cameras[0].pose.position == [-0.95, -49, 8]
     assert (result.provenance.seed, result.provenance.model_sha256) == (7, "f" * 64)
     assert set(result.timings_s) == set(result.cpu_s) == {"decode", "evolution", "preview"}
-    assert [step["stage"] for step in steps] == ["evolution", "preview"]
+    assert [step.stage for step in steps] == ["evolution", "preview"]
     assert [camera.seen_by_network for camera in result.cameras] == ["overview", "full"]
     assert (set(outcome.pictures), outcome.later) == (ALL_PICTURES | MASKS, ())
     begins = {".jpg": b"\xff\xd8", ".png": b"\x89PNG"}
@@ -358,7 +360,7 @@ def test_what_json_cannot_say_is_null(venue, files, asked, means):
     camera = solve(venue, files, Options(seed=7), means, steps.append).result.cameras[0]
     assert (camera.sigma, camera.moved.pixels, camera.residual_px) == (None, None, None)
     assert camera.repeatability.position_m == 0.02
-    assert (steps[0]["loss"], steps[0]["fraction"]) == (None, to_schemas.PREVIEW_FRACTION)
+    assert (steps[0].loss, steps[0].fraction) == (None, to_schemas.PREVIEW_FRACTION)
 
 
 def test_what_a_program_says_is_what_its_worker_understands(venue, files, asked, means):
@@ -367,6 +369,22 @@ def test_what_a_program_says_is_what_its_worker_understands(venue, files, asked,
     assert Message.model_validate_json(program.encode({"progress": steps[0]})).progress.stage == "evolution"
     said = program.encode({"result": outcome.result.model_dump(mode="json"), "later": list(outcome.later)})
     assert Message.model_validate_json(said) == Message(result=outcome.result, later=outcome.later)
+
+
+def unwritten(model):
+    """The fields of a model, and of those in it, that are there by their defaults alone."""
+    if isinstance(model, list):
+        return [name for one in model for name in unwritten(one)]
+    if not isinstance(model, BaseModel):
+        return []
+    inner = [name for _, value in model for name in unwritten(value)]
+    return [*(model.__class__.model_fields.keys() - model.model_fields_set), *inner]
+
+
+def test_a_program_writes_every_field_of_a_result(venue, files, asked, means):
+    asked["markings"] = [MarkingReport("left goal line", 40.2, 0.9, -0.08, 0.01, "outside")]
+    asked |= {"against": {"left": "turned by 11.2 degrees"}, "reason": "knocked", "lights": {"left": Light()}}
+    assert unwritten(solve(venue, files, Options(), means, lambda _: None).result) == []
 
 
 def test_numbers_of_numpy_and_such_as_json_has_none_for_are_written_as_it_can(tmp_path):

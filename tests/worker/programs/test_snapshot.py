@@ -4,10 +4,7 @@ import re
 import socket
 import subprocess
 import sys
-import threading
-import time
 from base64 import b64encode
-from contextlib import suppress
 from fractions import Fraction
 
 import av
@@ -21,6 +18,7 @@ from service.schemas.problems import Problem
 from service.schemas.venue import VenueIn
 from service.settings import Settings
 from tests.e2e.running import venue
+from tests.listener import Parrot
 from tests.worker.certificates import certificate
 from tests.worker.receiver import TELLTALE
 from tests.worker.sources.streaming_camera import ASKS, SIZE, Film, Stranger, StreamingCamera
@@ -140,18 +138,8 @@ def test_nobody_else_on_the_machine_speaks_to_the_camera_through_the_relay(camer
     ],
 )
 def test_what_does_not_speak_rtsp_is_called_so(tmp_path, says, words):
-    with socket.create_server(("127.0.0.1", 0)) as listener:
-
-        def answer():
-            connection, _ = listener.accept()
-            with connection:
-                connection.recv(4096)
-                connection.sendall(says)
-                time.sleep(1)
-
-        threading.Thread(target=answer, daemon=True).start()
-        said = refused(tmp_path, "rtsp://{}:{}/live".format(*listener.getsockname()), None)
-    assert words in said
+    with Parrot(says) as listener:
+        assert words in refused(tmp_path, f"rtsp://{listener.host}/live", None)
 
 
 def test_the_program_loads_no_models_of_venues_and_results():
@@ -232,19 +220,8 @@ def test_a_stream_that_is_joined_in_the_middle_gives_a_frame_after_it_has_become
 @pytest.mark.parametrize("says", TELLTALE)
 @pytest.mark.parametrize("userinfo", [None, RIGHT])
 def test_nothing_that_the_host_of_a_source_says_is_read_through_its_refusal(tmp_path, says, userinfo):
-    with socket.create_server(("127.0.0.1", 0)) as listener:
-
-        def answer():
-            with suppress(OSError):
-                while True:
-                    connection, _ = listener.accept()
-                    with connection:
-                        connection.recv(4096)
-                        connection.sendall(says)
-
-        threading.Thread(target=answer, daemon=True).start()
-        # Some are read as an answer without a picture, as of a camera that writes bad heads.
-        with pytest.raises(Problem) as refusal:
-            taken(tmp_path, "http://{}:{}/picture".format(*listener.getsockname()), userinfo)
+    # Some are read as an answer without a picture, as of a camera that writes bad heads.
+    with Parrot(says) as listener, pytest.raises(Problem) as refusal:
+        taken(tmp_path, f"http://{listener.host}/picture", userinfo)
     assert "hunter2" not in refusal.value.detail
     assert "bytearray" not in refusal.value.detail

@@ -3,7 +3,6 @@
 import hashlib
 import re
 import socket
-import ssl
 import struct
 import threading
 from base64 import b64encode
@@ -14,6 +13,8 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+
+from tests.listener import Listener
 
 USERINFO = "user:pass word"
 ASKS = {
@@ -35,33 +36,22 @@ class Film:
     pictures: list[list[bytes]]
 
 
-class Stranger:
+class Stranger(Listener):
     """A host that a camera leads to: keeps what is said to it."""
 
     def __init__(self) -> None:
         self.heard: list[bytes] = []
-        self._listener = socket.create_server(("127.0.0.1", 0))
-        self.host = "{}:{}".format(*self._listener.getsockname())
-        threading.Thread(target=self._listen, daemon=True).start()
+        super().__init__()
 
-    def _listen(self) -> None:
-        while True:
-            try:
-                connection, _ = self._listener.accept()
-            except OSError:
-                return
-            self.heard.append(b"a connection")
-            with connection:
-                connection.sendall(b'RTSP/1.0 401 Unauthorized\r\nCSeq: 1\r\nWWW-Authenticate: Basic realm="x"\r\n\r\n')
-                connection.settimeout(5)
-                while data := connection.recv(4096):
-                    self.heard.append(data)
-
-    def close(self) -> None:
-        self._listener.close()
+    def converse(self, connection: socket.socket) -> None:
+        self.heard.append(b"a connection")
+        connection.sendall(b'RTSP/1.0 401 Unauthorized\r\nCSeq: 1\r\nWWW-Authenticate: Basic realm="x"\r\n\r\n')
+        connection.settimeout(5)
+        while data := connection.recv(4096):
+            self.heard.append(data)
 
 
-class StreamingCamera:
+class StreamingCamera(Listener):
     """A stream by RTSP (RFC 2326), interleaved in one TCP connection, for user:pass word.
 
     `way`: how it asks for them. `leads`: the methods that it answers with a redirect, and where that leads. `film`:
@@ -79,31 +69,13 @@ class StreamingCamera:
     ) -> None:
         self.asked: list[tuple[str, str]] = []
         self._way, self._leads = way, leads or {}
-        self._tls = None
-        if certificate is not None:
-            self._tls = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
-            self._tls.load_cert_chain(certificate)
         frame = np.full((SIZE[1], SIZE[0], 3), shade, np.uint8)
         self._film = film or Film(SDP, 26, [[_rtp_payload(cv2.imencode(".jpg", frame)[1].tobytes())]])
-        self._listener = socket.create_server(("127.0.0.1", 0))
-        self.host = "{}:{}".format(*self._listener.getsockname())
-        threading.Thread(target=self._accept, daemon=True).start()
+        super().__init__(certificate=certificate)
 
-    def close(self) -> None:
-        self._listener.close()
-
-    def _accept(self) -> None:
-        with suppress(OSError):
-            while True:
-                connection, _ = self._listener.accept()
-                threading.Thread(target=self._converse, args=(connection,), daemon=True).start()
-
-    def _converse(self, connection: socket.socket) -> None:
+    def converse(self, connection: socket.socket) -> None:
         stop = threading.Event()
-        with suppress(OSError):
-            if self._tls is not None:
-                connection = self._tls.wrap_socket(connection, server_side=True)
-        with connection, suppress(OSError), connection.makefile("rb") as lines:
+        with suppress(OSError), connection.makefile("rb") as lines:
             while begin := lines.read(1):
                 if begin == b"$":
                     lines.read(int.from_bytes(lines.read(3)[1:]))

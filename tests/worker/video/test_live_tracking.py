@@ -7,6 +7,7 @@ import subprocess
 import time
 from contextlib import contextmanager
 from dataclasses import replace
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -16,9 +17,9 @@ from tests.worker.calibration.synthetic import CROWNED, moved, pair
 from tests.worker.video.shaking import COUNT, film_shaking, turn
 from worker.calibration.geometry import derivatives
 from worker.calibration.geometry.rotation import rotation_angles_deg
-from worker.calibration.tracking.follower import CameraTracker
+from worker.calibration.tracking.follower import CameraTracker, TrackedPose
 from worker.video import clips, live_tracking
-from worker.video.live_tracking import UNSURE_DEG, StreamTracker
+from worker.video.live_tracking import UNSURE_DEG, StreamTracker, _ArrivedPicture
 from worker.video.stream_clock import StreamClock
 
 pytestmark = pytest.mark.slow
@@ -87,10 +88,11 @@ def test_a_camera_that_took_long_to_be_found_is_tracked_on_from_there(clip, monk
 def test_a_camera_is_measured_in_a_picture_before_which_none_was_decoded_for_a_second(clip, monkeypatch):
     shots = clips.Clip.shots
     monkeypatch.setattr(clips.Clip, "shots", lambda *at: (s for n, s in enumerate(shots(*at)) if n in (0, COUNT - 1)))
+    monkeypatch.setattr(StreamClock, "taken_ns", lambda *_: time.time_ns() - 10**9)
     with Tracking(clip) as tracking:
         while (pose := tracking.poses.get(timeout=60)).number < 1:
             pass
-    assert pose.tracked.how == "measured"
+    assert (pose.tracked.how, pose.clock) == ("measured", "rtcp")
     assert turned_deg(pose.tracked.camera, swung(COUNT - 1)) < 0.02
 
 
@@ -98,40 +100,33 @@ def swung(number):
     return derivatives.moved(TRUE, np.array([*turn(number, 0.0), 0, 0, 0]))
 
 
-def test_a_pose_that_is_told_ahead_is_of_a_time_after_its_picture(clip):
-    with Tracking(clip, ahead_s=0.12) as tracking:
-        pose = tracking.poses.get(timeout=60)
+def reported(*ages_s, ahead_s=0.0):
+    """The poses and remarks by pictures, one a second, that arrive so long after their camera says they were taken."""
+    tracking, known = Tracking("", ahead_s=ahead_s), TrackedPose(TRUE, "measured", np.eye(6), np.eye(6))
+    for number, age_s in enumerate(ages_s):
+        arrived_ns = (1_800_000_000 + number) * 10**9
+        taken_ns = arrived_ns - round(age_s * 1e9)
+        picture = _ArrivedPicture(None, number, float(number), 0.0, taken_ns, arrived_ns, True, False)
+        tracking.camera._report(known, picture, Fraction(25))
+    return list(tracking.poses.queue), list(tracking.remarks.queue)
+
+
+def test_times_of_poses_are_those_of_the_cameras_clock_while_that_is_right():
+    poses, (wrong, right) = reported(1.0, 3600.0, 3600.0, 0.1)
+    assert [pose.clock for pose in poses] == ["rtcp", "arrival", "arrival", "rtcp"]
+    assert [(pose.arrived_ns - pose.at_ns) / 1e9 for pose in poses] == [1.0, 0.0, 0.0, 0.1]
+    assert "its clock is 3600.0 s behind" in wrong
+    assert "its clock is right again" in right
+
+
+def test_a_clock_that_is_set_is_said():
+    _, (remark,) = reported(0.1, 1.6)
+    assert "its clock was set back by 1.5 s" in remark
+
+
+def test_a_pose_that_is_told_ahead_is_of_a_time_after_its_picture():
+    (pose,), _ = reported(0.0, ahead_s=0.12)
     assert pose.at_ns - pose.arrived_ns == 120_000_000
-
-
-def test_times_of_a_camera_whose_clock_is_wrong_are_not_taken_over(clip, monkeypatch):
-    monkeypatch.setattr(StreamClock, "taken_ns", lambda *_: time.time_ns() - 3600 * 10**9)
-    with Tracking(clip) as tracking:
-        pose = tracking.poses.get(timeout=60)
-        assert (pose.clock, pose.at_ns) == ("arrival", pose.arrived_ns)
-        assert "its clock is 3600" in tracking.remarks.get(timeout=60)
-
-
-def test_times_of_a_camera_whose_clock_is_right_are_those_of_its_poses(clip, monkeypatch):
-    monkeypatch.setattr(StreamClock, "taken_ns", lambda *_: time.time_ns() - 10**9)
-    with Tracking(clip) as tracking:
-        pose = tracking.poses.get(timeout=60)
-    assert pose.clock == "rtcp"
-    assert 1.0 <= (pose.arrived_ns - pose.at_ns) / 1e9 < 2.0
-
-
-def test_a_clock_that_is_set_is_said(clip, monkeypatch):
-    # A file is not read at the rate of its pictures.
-    monkeypatch.setattr(live_tracking, "LATEST_S", 1000.0)
-    begin_ns = time.time_ns() - 5 * 10**9
-
-    def taken_ns(_, pts, time_base):
-        stream_s = float(pts * time_base)
-        return begin_ns + int(1e9 * (stream_s - 2 * (stream_s > 0.4)))
-
-    monkeypatch.setattr(StreamClock, "taken_ns", taken_ns)
-    with Tracking(clip) as tracking:
-        assert "its clock was set back by 2.0 s" in tracking.remarks.get(timeout=60)
 
 
 def test_a_frozen_picture_is_said_and_measured_once(tmp_path):

@@ -5,7 +5,7 @@ import shutil
 import socket
 import subprocess
 import threading
-import time
+from contextlib import ExitStack, contextmanager
 from fractions import Fraction
 
 import av
@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from tests.disks import filled, may_mount, small_disk
+from tests.e2e.running import wait_for
 from tests.ports import free_port, is_listened_on
 from tests.worker.video.filming import LEFT, PITCH, RIGHT, cameras, film, frame_at, frames_of
 from worker.calibration.stitching.panorama import BACKDROP, panorama
@@ -282,28 +283,8 @@ def test_sound_alone_is_no_video(tmp_path, pair):
 
 def beeps(path):
     """When a second's tone begins, by ffmpeg's decoder."""
-    raw = subprocess.run(
-        [
-            "ffmpeg",
-            "-v",
-            "error",
-            "-i",
-            path,
-            "-map",
-            "a",
-            "-af",
-            "aresample=async=1:first_pts=0",
-            "-f",
-            "s16le",
-            "-ac",
-            "1",
-            "-ar",
-            "48000",
-            "-",
-        ],
-        capture_output=True,
-        check=True,
-    ).stdout
+    tones = ["-map", "a", "-af", "aresample=async=1:first_pts=0", "-f", "s16le", "-ac", "1", "-ar", "48000", "-"]
+    raw = subprocess.run(["ffmpeg", "-v", "error", "-i", path, *tones], capture_output=True, check=True).stdout
     loud = np.abs(np.frombuffer(raw, np.int16).astype(int)) > 3000
     begins = np.flatnonzero(loud[1:] & ~np.convolve(loud, np.ones(2400), "full")[: len(loud) - 1].astype(bool))
     return begins / 48000
@@ -370,39 +351,27 @@ def test_where_nothing_can_be_written_is_said(tmp_path, pair, output, encoding, 
     assert list(tmp_path.iterdir()) == []
 
 
-def wait_for(condition):
-    end = time.monotonic() + 20
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.05)
+@contextmanager
+def ffmpeg_running(*arguments):
+    """ffmpeg, which sends or receives a stream, until it is no longer needed."""
+    process = subprocess.Popen(["ffmpeg", "-v", "error", *arguments])
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.wait()
 
 
 def test_a_receiver_of_udp_sees_the_view(tmp_path, pair):
     port = free_port(socket.SOCK_DGRAM)
     received = tmp_path / "received.mkv"
     address = f"udp://127.0.0.1:{port}"
-    receiver = subprocess.Popen(
-        [
-            *(
-                "ffmpeg",
-                "-v",
-                "error",
-                "-analyzeduration",
-                "500000",
-                "-i",
-                f"{address}?timeout=4000000&fifo_size=100000",
-            ),
-            *("-c", "copy", "-t", "1", received),
-        ],
-    )
-    try:
+    receive = "-analyzeduration", "500000", "-i", f"{address}?timeout=4000000&fifo_size=100000", "-c", "copy", "-t", "1"
+    with ffmpeg_running(*receive, received) as receiver:
         wait_for(lambda: is_listened_on(port, "udp"))
         for _ in range(2):
             stitch(SCENE, pair, Plan(address, TOGETHER, encoding=Encoding(crf=20, preset="ultrafast")), told)
         receiver.wait(20)
-    finally:
-        receiver.kill()
-        receiver.wait()
     pictures = frames_of(received)
     assert pictures[0].shape[:2] == VIEW.size[::-1]
     assert min(off(pictures[0], expected(number / 25)) for number in range(0, 50, 10)) <= 4
@@ -416,20 +385,13 @@ def test_live_streams_that_tell_no_time_are_put_in_time_by_what_moves(tmp_path, 
     }
     ports = {camera: free_port() for camera in films}
     addresses = {camera: f"tcp://127.0.0.1:{port}" for camera, port in ports.items()}
-    senders = [
-        subprocess.Popen(
-            ["ffmpeg", "-v", "error", "-re", "-i", path, "-c", "copy", "-f", "mpegts", f"{addresses[camera]}?listen=1"]
-        )
-        for camera, path in films.items()
-    ]
-    try:
+    with ExitStack() as senders:
+        for camera, path in films.items():
+            send = "-re", "-i", path, "-c", "copy", "-f", "mpegts", f"{addresses[camera]}?listen=1"
+            senders.enter_context(ffmpeg_running(*send))
         wait_for(lambda: all(map(is_listened_on, ports.values())))
         plan = Plan(str(tmp_path / "pano.mp4"), rate=Fraction(10), encoding=FINE)
         made = stitch(SCENE, addresses, plan, told)
-    finally:
-        for sender in senders:
-            sender.kill()
-            sender.wait()
     assert made.found["right"].strength > 0.6
     assert made.frames > 20
     # Whatever the world's time of the first picture: both cameras show the same one.
@@ -446,24 +408,8 @@ def test_a_live_stream_needs_an_offset_and_is_read_as_it_comes(tmp_path, pair):
     port = free_port(socket.SOCK_DGRAM)
     address = f"udp://127.0.0.1:{port}"
     clips = {"left": pair["left"], "right": address + "?timeout=5000000&fifo_size=100000"}
-    sender = subprocess.Popen(
-        [
-            "ffmpeg",
-            "-v",
-            "error",
-            "-re",
-            "-stream_loop",
-            "3",
-            "-i",
-            pair["right"],
-            "-c",
-            "copy",
-            "-f",
-            "mpegts",
-            address,
-        ]
-    )
-    try:
+    send = "-re", "-stream_loop", "3", "-i", pair["right"], "-c", "copy", "-f", "mpegts", address
+    with ffmpeg_running(*send):
         with pytest.raises(
             VideoError,
             match=r"camera right is a live stream and others are files.*--offset right=0 takes pictures as they",
@@ -472,8 +418,5 @@ def test_a_live_stream_needs_an_offset_and_is_read_as_it_comes(tmp_path, pair):
         alone = {"right": clips["right"]}
         plan = Plan(str(tmp_path / "pano.mp4"), allow_missing=True, encoding=FINE)
         made = stitch(SCENE, alone, plan, told)
-    finally:
-        sender.kill()
-        sender.wait()
     assert made.frames > 10
     assert cv2.absdiff(frames_of(tmp_path / "pano.mp4")[5], expected(0, [RIGHT])).mean() < 8

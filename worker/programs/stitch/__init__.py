@@ -1,1 +1,1 @@
-"""What leaves the service of a stitched view: maps, weights and lights for other tools, and a picture of it."""
+"""Exports of a stitched view: maps, weights and lights for other tools, and a picture of it."""

@@ -40,36 +40,36 @@ MOST_PLACES = 40_000_000
 def main() -> None:
     """Read what is wanted, write it."""
     child_process.begin_decoder()
-    given = sys.stdin.buffer.read()
-    end = given.index(b"\n")
-    asked = StitchRequest.model_validate_json(given[:end])
-    cv2.setNumThreads(asked.threads)
-    made = stitched(asked)
-    if asked.wanted == "picture":
-        answer = encode_jpeg(picture(asked, made, split_files(given[end + 1 :], asked.sizes)))
+    data = sys.stdin.buffer.read()
+    end = data.index(b"\n")
+    request = StitchRequest.model_validate_json(data[:end])
+    cv2.setNumThreads(request.threads)
+    made = stitched(request)
+    if request.wanted == "picture":
+        answer = encode_jpeg(picture(request, made, split_files(data[end + 1 :], request.sizes)))
     else:
-        answer = package(asked, made)
+        answer = package(request, made)
     sys.stdout.buffer.write(answer)
 
 
-def stitched(asked: StitchRequest) -> Panorama:
-    """How frames become the view that was chosen."""
-    pitch, cameras = pitch_of(asked.field), [camera_of(camera) for camera in asked.cameras]
-    view = chosen_view(pitch, cameras, choice_of(asked.view))
+def stitched(request: StitchRequest) -> Panorama:
+    """Return the panorama of the chosen view."""
+    pitch, cameras = pitch_of(request.field), [camera_of(camera) for camera in request.cameras]
+    view = chosen_view(pitch, cameras, choice_of(request.view))
     width, height = view.size
     if width * height * len(cameras) > MOST_PLACES:
         print(f"{len(cameras)} cameras in {width}x{height} pixels are too much: ask for fewer pixels", file=sys.stderr)
         sys.exit(os.EX_DATAERR)
-    return panorama(pitch, view, cameras, {camera: light_of(light) for camera, light in asked.lights.items()})
+    return panorama(pitch, view, cameras, {camera: light_of(light) for camera, light in request.lights.items()})
 
 
-def picture(asked: StitchRequest, made: Panorama, files: Mapping[str, bytes]) -> Picture:
-    """What the view makes of frames. Somebody waits for it: they are read no larger than it shows them."""
-    with ThreadPoolExecutor(asked.threads) as each:
+def picture(request: StitchRequest, made: Panorama, files: Mapping[str, bytes]) -> Picture:
+    """Draw the view of frames, which are read no larger than it shows them, since somebody waits for it."""
+    with ThreadPoolExecutor(request.threads) as each:
         read = [*each.map(lambda part: _read(part, files[part.camera]), made.parts)]
     smaller = replace(made, parts=[part for part, _ in read])
     drawn = smaller.picture({part.camera: frame for part, frame in read})
-    if asked.seam:
+    if request.seam:
         layer = seam_layer(made.owner)
         painted = layer[..., 3] > 0
         drawn[painted] = layer[painted, :3]

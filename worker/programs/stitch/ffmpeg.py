@@ -20,19 +20,19 @@ from worker.calibration.stitching.panorama import BACKDROP, Contribution, Panora
 from worker.calibration.stitching.photometry import MIDDLE, Light
 from worker.programs.stitch.scaled import in_scaled, scaled_size
 
-# What `remap` fills in for.
+# Coordinate that makes `remap` fill in the background.
 NOWHERE = 65535
 # Less than a grey level.
 LEAST_FALLOFF = 0.002
-# Of stills, as cameras save them, and of video; what a file says of its own range is obeyed.
+# Colour matrices of stills, as cameras save them, and of video; the range that a file names is obeyed.
 STILLS, VIDEO = "bt601", "bt709"
-# Of what is written, unless somebody wants more.
+# Pixel format of the output, unless the caller chooses one.
 PIXELS = "yuv420p"
 SCRIPT, COMMAND = "stitch.ffscript", "stitch.sh"
 
 
 def files(made: Panorama) -> dict[str, bytes]:
-    """Files by name."""
+    """Return the files by name."""
     cameras = [_of_camera(part, mask) for part, mask in zip(made.parts, sequential(made), strict=True)]
     # A first camera has nothing to be laid over.
     cameras[0].maps.pop("mask")
@@ -45,7 +45,7 @@ def files(made: Panorama) -> dict[str, bytes]:
 
 
 def sequential(made: Panorama) -> list[NDArray[np.float32]]:
-    """How much each camera counts beside those before it, 0 to 1 (H, W): laid over each other so, they sum to 1."""
+    """Return the opacity of each camera, 0 to 1 (H, W), laid over those before it: the weights then sum to 1."""
     weights = np.stack([part.weight for part in made.parts])
     return list(weights / np.maximum(np.cumsum(weights, axis=0), np.float32(1e-9)))
 
@@ -64,7 +64,7 @@ class _Camera:
     maps: dict[str, bytes]
 
     def file(self, kind: str) -> str:
-        """What the file is called."""
+        """Return the name of a file."""
         return f"{self.id}_{kind}.pgm"
 
     @property
@@ -79,7 +79,7 @@ def _of_camera(part: Contribution, mask: NDArray[np.float32]) -> _Camera:
     rows, columns = box(counts) if counts.any() else (slice(0, 2), slice(0, 2))
     camera = _Camera(part.camera, scaled_size(part), part.light, (columns.start, rows.start), {})
     place = in_scaled(part, camera.size)[rows, columns]
-    # Of the four pixels around each place.
+    # The first of the four pixels around each place.
     first = np.clip(np.floor(place), 0, np.array(camera.size) - 2)
     beside = np.clip(place - first, 0, 1)
     first[~counts[rows, columns]] = NOWHERE
@@ -151,7 +151,7 @@ def _sampled(camera: _Camera, video: str, maps: Mapping[str, str]) -> list[str]:
 
 
 def _evened_out(camera: _Camera, maps: Mapping[str, str]) -> list[str]:
-    """What a camera sees, as bright as the others see it."""
+    """Return the filters that match a camera's brightness to the others."""
     if "falloff" not in maps:
         return [f"[{camera.id} seen]{_tones(camera.light, 1)}[{camera.id} even]"]
     least, largest = camera.rises
@@ -168,7 +168,7 @@ def _evened_out(camera: _Camera, maps: Mapping[str, str]) -> list[str]:
 
 
 def _tones(light: Light, times: float) -> str:
-    """What becomes of grey levels, `times` a number: `Light.tones` as expressions of ffmpeg's."""
+    """Return `Light.tones`, multiplied by `times`, as a filter of ffmpeg."""
     blue, green, red = (
         f"{MIDDLE * gain * times:.6f}*pow(val/{MIDDLE:g},{1 + light.contrast:.6f})+0.5" for gain in light.gain
     )
@@ -176,7 +176,7 @@ def _tones(light: Light, times: float) -> str:
 
 
 def _each(expression: str) -> str:
-    """The same of each colour."""
+    """Return the filter that applies one expression to each colour."""
     return f"lutrgb=r='{expression}':g='{expression}':b='{expression}'"
 
 
@@ -213,7 +213,7 @@ def _command(cameras: Sequence[str], maps: Sequence[str]) -> str:
             "set -eu",
             f'if [ $# -ne {count + 1} ]; then echo "usage: $0 {" ".join(names)} OUTPUT" >&2; exit 2; fi',
             'here=$(dirname "$0")',
-            # Of each JPEG ffmpeg warns that its pixel format is deprecated, which it is in ffmpeg's own terms alone.
+            # ffmpeg warns of each JPEG that its pixel format is deprecated, which only concerns ffmpeg itself.
             f'case "$1" in *.jpg | *.jpeg | *.JPG | *.JPEG) still={STILLS} level=error ;; '
             f"*) still={VIDEO} level=warning ;; esac",
             f'case "${{{count + 1}}}" in *.png | *.PNG) pixels=yuv444p ;; *) pixels={PIXELS} ;; esac',

@@ -1,4 +1,4 @@
-"""To which size a frame is scaled before a view is sampled from it, by tools that know no levels of detail."""
+"""Size to which a frame is scaled before a view is sampled from it, by tools that know no levels of detail."""
 
 from __future__ import annotations
 
@@ -18,6 +18,6 @@ def scaled_size(part: Contribution) -> tuple[int, int]:
 
 
 def in_scaled(part: Contribution, size: tuple[int, int]) -> NDArray[np.float32]:
-    """Where each pixel of the view lies in the scaled frame (H, W, 2), pixel centres at integers."""
+    """Return the place of each pixel of the view in the scaled frame (H, W, 2), pixel centres at integers."""
     scale = np.array(size, np.float32) / np.array(part.frame_size, np.float32)
     return np.asarray((part.source + 0.5) * scale - 0.5, np.float32)
