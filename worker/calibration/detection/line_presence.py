@@ -1,4 +1,4 @@
-"""Whether the markings can be seen at all, near where a pose that may be some degrees off expects them.
+"""Test whether the markings are visible at all, near where a pose that may be some degrees off expects them.
 
     sight = look_for_lines(picture, seen_lines, reach_px)
 
@@ -19,33 +19,34 @@ from worker.calibration.geometry.camera import Array, Frame
 from worker.calibration.geometry.visibility import VisibleLines
 
 COARSE_PX = 6
-"""Step between the shifts that are tried; what a streak reaches is widened by as much."""
+"""Step between the shifts that are tried; streaks are widened by as much."""
 NEAR_PX = 12
-"""How far from the common shift a line may be: a turn bends what it shifts, and the place may be off as well."""
+"""Largest distance of a line from the common shift: a turn bends what it shifts, and the place may be off as well."""
 AGREED_PX = 2.5
-"""How far apart two neighbours on one line may find it."""
+"""Largest difference between the offsets of two neighbours on one line."""
 STANDS_OUT = 1.6
-"""A line is so much stronger than what chance finds beside it."""
+"""Ratio of a line's strength to that of chance beside it."""
 LOCALLY, SQUARE_PX = 1.3, 120
-"""...and than it finds in this square of the picture, by so much: nets, patterns and lettering are streaks as well."""
+"""Ratio of a line's strength to that of chance in its square of the picture, and the side of that: nets, patterns and
+lettering are streaks as well."""
 ROLLS_RAD = (-0.03, 0.0, 0.03)
 """Turns about the middle that are tried with each shift."""
 MOST_TRIED = 120
-"""So many of the places on lines are enough to find the shift."""
+"""Most places on lines that are used to find the shift."""
 SATURATION, HALF_SURE = 20.0, 10.0
-"""A streak of more contrast than the first counts no more, one of the second is half a line."""
+"""Contrast of a streak above which it counts no more, and at which it is half a line."""
 FAR_COSTS = 0.05
-"""Of two shifts that are as good, the nearer one is taken."""
+"""Score that the farthest shift loses: of two shifts that are as good, the nearer one is taken."""
 SETTLING_STEPS, ROBUST_STEPS = 2, 4
 HELD = 20.0
-"""How much evidence a movement needs, so that a handful of lines does not turn the picture."""
+"""Prior weight of no movement, so that a handful of lines does not turn the picture."""
 
 
 @dataclass(frozen=True)
 class LinesInSight:
-    """What was found of N expected places on lines.
+    """Search result at N expected places on lines.
 
-    `pixel` (N, 2): where they would be, after the shift; `found` (N,): whether there is a line; `contrast` (N,): of the
+    `pixel` (N, 2): their place after the shift; `found` (N,): True if there is a line; `contrast` (N,): of the
     strongest streak there, in grey levels.
     """
 
@@ -68,7 +69,7 @@ def look_for_lines(picture: Frame, lines: VisibleLines, reach_px: float) -> Line
 
 
 def _match(streaks: Streaks, lines: VisibleLines, at: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Where along its normal each line is strongest, near `at` (N, 2): offset, contrast, and whether it is a line."""
+    """Find the strongest streak along the normal of each line, near `at` (N, 2): offset, contrast, True for a line."""
     steps = np.arange(-NEAR_PX, NEAR_PX + 1)
     near, *beside = (
         streaks.read(lines, at[:, None] + (steps + aside)[:, None] * lines.normal[:, None])
@@ -83,13 +84,13 @@ def _match(streaks: Streaks, lines: VisibleLines, at: Array) -> tuple[Array, Arr
 
 
 def _of_neighbours(at: Array, values: Array) -> Array:
-    """The median (N,) of values (N,) in the same square of the picture."""
+    """Return the median (N,) of values (N,) in the same square of the picture."""
     square = np.unique(np.floor(at / SQUARE_PX).astype(int), axis=0, return_inverse=True)[1].ravel()
     return np.array([np.median(values[square == number]) for number in range(square.max() + 1)])[square]
 
 
 def _movement(at: Array, normal: Array, offset: Array, weight: Array) -> Array:
-    """What shift, turn and growth (N, 2) of the whole brings the lines closest to where they were found."""
+    """Fit the shift, turn and growth of the whole that brings the lines to where they were found: a movement (N, 2)."""
     middle = at - at.mean(axis=0)
     size = max(float(np.abs(middle).max()), 1.0)
     turn = np.stack([-middle[:, 1], middle[:, 0]], axis=1) / size
@@ -105,14 +106,14 @@ def _movement(at: Array, normal: Array, offset: Array, weight: Array) -> Array:
 
 
 def _agreeing(offset: NDArray[np.intp], lines: VisibleLines) -> NDArray[np.bool_]:
-    """Whether a neighbour on the same marking (N,) found the line about as far off."""
+    """True (N,) if a neighbour on the same marking has about the same offset."""
     same = np.diff(lines.points.marking) == 0
     agree = same & (np.abs(np.diff(offset)) <= AGREED_PX)
     return np.concatenate([[False], agree]) | np.concatenate([agree, [False]])
 
 
 def _common_shift(streaks: Streaks, lines: VisibleLines, reach_px: float) -> Array:
-    """The shift (N, 2) at which most lines lie on streaks: the same for all but for a turn about the middle."""
+    """Return the shift (N, 2) at which most lines lie on streaks: the same for all but for a turn about the middle."""
     steps = COARSE_PX * np.arange(-int(reach_px // COARSE_PX), int(reach_px // COARSE_PX) + 1)
     shifts = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
     wide = streaks.widened(COARSE_PX)
@@ -127,6 +128,6 @@ def _common_shift(streaks: Streaks, lines: VisibleLines, reach_px: float) -> Arr
 
 
 def _turned(pixel: Array, of: Array, angle: float) -> Array:
-    """By how much pixels (N, 2) move when the picture turns about the middle of others by a small angle."""
+    """Return the displacement (N, 2) of pixels by a small turn of the picture about the middle of others."""
     away = pixel - of.mean(axis=0)
     return angle * np.stack([-away[:, 1], away[:, 0]], axis=1)

@@ -17,16 +17,16 @@ from worker.calibration.detection.segmentation import Region
 from worker.calibration.geometry.camera import Array, Frame
 
 LOOKED_AT_WIDTH_PX = 640
-"""Width at which the ground is looked for: lines are thin there."""
+"""Width of the reduced picture in which the ground is estimated: lines are thin there."""
 GROUND_PX = 21
 """Side of the square whose median is the ground, px at that width: more than twice as wide as any line."""
 DARK = 4.0
-"""Added to all brightness, grey levels: what is black anyway has no colour."""
+"""Grey levels added to all brightness: what is black anyway has no colour."""
 LEAST_DIFFERENCE = 0.25
 """The least difference of a line from its ground, as a share of the ground's brightness, whose colour is read off."""
 MOST_COLOURS = 8
-"""Into how many colours all that stands out is sorted. Halls have up to six paints; one that shines, or that another
-line touches, has two."""
+"""Number of clusters into which the colours that stand out are sorted. Halls have up to six paints; one that shines, or
+that another line touches, has two."""
 LEAST_PART = 0.03
 """The least part of all that stands out from the ground which a paint of lines has."""
 SPREAD_RAD = 0.2
@@ -36,7 +36,7 @@ FAINTEST = 0.15
 GROUND_LEVEL, PAINT_LEVEL = 60.0, 140.0
 """Grey levels of the ground, and by how much paint is brighter, where only some colours are drawn."""
 ROWS = 256
-"""Rows of a frame that are looked at at once: a frame of 4K would take 400 MB as numbers."""
+"""Rows of a frame that are processed at once: a frame of 4K would take 400 MB as numbers."""
 
 
 def sort_colours(frames: Sequence[Frame], regions: Sequence[Sequence[Region]]) -> Array:
@@ -85,7 +85,8 @@ def draw_colours(frame: Frame, colours: Array, chosen: Sequence[int]) -> Frame:
 
 
 def _colours_of_lines(frame: Frame, regions: Sequence[Region]) -> NDArray[np.float32]:
-    """Differences (N, 3) to the ground of pixels that differ more than their neighbours: the middles of lines."""
+    """Return differences (N, 3) to the ground of pixels that differ more than their neighbours: the middles of
+    lines."""
     looked_at = np.zeros(frame.shape[:2], dtype=bool)
     for region in regions:
         looked_at[region.top : region.bottom, region.left : region.right] = True

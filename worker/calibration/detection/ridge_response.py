@@ -17,17 +17,17 @@ from worker.calibration.geometry.visibility import VisibleLines
 WORKING_PX = 960
 """Columns of the reduced picture in which streaks are looked for."""
 SURROUNDINGS_PX = 121
-"""A streak is measured by what is usual in such a square of the reduced picture: texture is full of streaks."""
+"""Side of the square of the reduced picture whose mean streak is the usual one: texture is full of streaks."""
 STANDS_OUT = 2.0
-"""Times the usual from which a streak may be a line; one of twice that is called one for sure."""
+"""Ratio to the usual from which a streak may be a line; one of twice that is called one for sure."""
 DIRECTIONS_APART = 0.75
-"""How far the direction of a streak may be from that of a line, in steps between two directions."""
+"""Largest angle between a streak and a line, in steps between two directions."""
 MASK_PX = 8
-"""Side of the squares in which it is told where lines can be."""
+"""Side of the squares of the mask of where lines can be."""
 
 
 def ridge_response(channels: Channels, lines: VisibleLines, reach_px: float) -> NDArray[np.float32]:
-    """How much (H, W), in 0..1, each pixel looks like one of `lines` that is at most `reach_px` from there."""
+    """Return a response (H, W) in 0..1: how much each pixel looks like one of `lines` at most `reach_px` away."""
     height, width = channels[GREEN].shape
     size = (min(WORKING_PX, width), max(1, round(height * min(1.0, WORKING_PX / width))))
     scale = size[0] / width
@@ -48,7 +48,7 @@ def ridge_response(channels: Channels, lines: VisibleLines, reach_px: float) -> 
 
 
 def _likelihood(strength: NDArray[np.uint8], level: int) -> NDArray[np.float32]:
-    """How likely (h, w) streaks of a level are lines, 0..1, beside what is usual around them."""
+    """Return the likelihood (h, w), 0..1, that streaks of a level are lines, beside what is usual around them."""
     side = SURROUNDINGS_PX // 2**level | 1
     values = strength.astype(np.float32)
     usual = np.maximum(STANDS_OUT * cv2.blur(values, (side, side)), LEAST_CONTRAST)
@@ -56,7 +56,7 @@ def _likelihood(strength: NDArray[np.uint8], level: int) -> NDArray[np.float32]:
 
 
 def _within(pixels: NDArray[np.float64], reach_px: float, size: tuple[int, int]) -> NDArray[np.float32]:
-    """1 (H, W) where any of the pixels (N, 2) is at most about `reach_px` away, 0 elsewhere."""
+    """Return 1 (H, W) where any of the pixels (N, 2) is at most about `reach_px` away, 0 elsewhere."""
     coarse = np.zeros((-(-size[1] // MASK_PX), -(-size[0] // MASK_PX)), dtype=np.uint8)
     column, row = np.clip((pixels / MASK_PX).astype(int).T, 0, [[coarse.shape[1] - 1], [coarse.shape[0] - 1]])
     coarse[row, column] = 1

@@ -9,4 +9,4 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Plane = NDArray[np.floating[Any]]
-"""One coordinate of many points, in the precision of whoever asks."""
+"""One coordinate of many points, in the precision of the caller."""

@@ -1,4 +1,4 @@
-"""Lenses: OpenCV's two models, what each makes of a ray, and the derivatives of that.
+"""Lenses: OpenCV's two models, with projection and analytic derivatives.
 
 A lens bends a ray, given by its undistorted image coordinates at depth 1 (x right, y down), to distorted ones, and its
 matrix makes pixels of those (pixel centres at integers). The models differ in how they bend alone.
@@ -22,13 +22,14 @@ SigmaSource = Literal["lines"]
 DISTORTION_LENGTHS = (0, 4, 5, 8, 12, 14)
 FISHEYE_DISTORTION_LENGTHS = (0, 4)
 WIDEST_FISHEYE_RAD = np.radians(89.0)
-"""How far off its axis a fisheye is used: beyond a right angle there are no image coordinates at depth 1."""
+"""Largest angle off the axis at which a fisheye is used: from a right angle on there are no image coordinates at depth
+1."""
 IN_PIXELS = ("fx", "fy", "cx", "cy")
 LENS_NUMBERS = ("focal_length_px", "principal_point_x_px", "principal_point_y_px", "aspect", "k1", "k2")
-"""The numbers of a lens that lines are asked for: fx, with which fy changes in proportion; cx and cy; fy / fx, which
-changes fy alone; the first two coefficients of the distortion."""
+"""Lens parameters that lines can determine: fx, with which fy changes in proportion; cx and cy; fy / fx, which changes
+fy alone; the first two coefficients of the distortion."""
 SIGMA_NAMES = dict(zip(LENS_NUMBERS, ("fx", "cx", "cy", "aspect", "k1", "k2"), strict=True))
-"""What these numbers are called in the `sigma` of a lens."""
+"""Names of these parameters in the `sigma` of a lens."""
 
 
 @dataclass(frozen=True)
@@ -47,24 +48,24 @@ class Lens(ABC):
     sigma_from: SigmaSource | None = None
     model: ClassVar[LensModel]
     terms: ClassVar[int]
-    """How many coefficients the model has."""
+    """Number of coefficients of the model."""
 
     def distort(self, rays: Array) -> Array:
-        """Undistorted image coordinates at depth 1, (..., 2), to pixels (..., 2); NaN beyond `largest_radius`."""
+        """Project undistorted image coordinates (..., 2) at depth 1 to pixels (..., 2); NaN beyond `largest_radius`."""
         return np.stack(self.distort_planes(rays[..., 0], rays[..., 1]), axis=-1)
 
     def distort_planes(self, x: Plane, y: Plane) -> tuple[Plane, Plane]:
-        """`distort` for columns and rows (...) apart, in their own precision: what large populations take."""
+        """Do as `distort` for columns and rows (...) apart, in their own precision: large populations need it."""
         xd, yd = self._bent(x, y)
         (fx, skew, cx), (_, fy, cy) = self.matrix[:2].tolist()
         return fx * xd + skew * yd + cx, fy * yd + cy
 
     def slopes(self, rays: Array) -> Array:
-        """The derivative (..., 2, 2) of the pixels of rays (..., 2) by the rays; NaN beyond `largest_radius`."""
+        """Jacobian (..., 2, 2) of the pixels of rays (..., 2) by the rays; NaN beyond `largest_radius`."""
         return self.matrix[:2, :2] @ self._bent_by_ray(rays)
 
     def slopes_by_numbers(self, rays: Array) -> Array:
-        """The derivative (..., 2, 6) of the pixels of rays (..., 2) by `LENS_NUMBERS`; NaN beyond `largest_radius`."""
+        """Jacobian (..., 2, 6) of the pixels of rays (..., 2) by `LENS_NUMBERS`; NaN beyond `largest_radius`."""
         xd, yd = self._bent(rays[..., 0], rays[..., 1])
         (fx, _), (_, fy) = self.matrix[:2, :2].tolist()
         slopes = np.zeros((*rays.shape, len(LENS_NUMBERS)))
@@ -77,7 +78,8 @@ class Lens(ABC):
 
     @abstractmethod
     def undistort(self, pixels: ArrayLike) -> Array:
-        """Pixels (..., 2) to undistorted image coordinates at depth 1 (..., 2); NaN where the model has no ray."""
+        """Return undistorted image coordinates (..., 2) at depth 1 of pixels (..., 2); NaN where the model has no
+        ray."""
 
     @property
     @abstractmethod
@@ -89,18 +91,18 @@ class Lens(ABC):
 
     @abstractmethod
     def _bent(self, x: Plane, y: Plane) -> tuple[Plane, Plane]:
-        """Distorted coordinates (...) of rays (...), in their own precision; NaN beyond `largest_radius`."""
+        """Return distorted coordinates (...) of rays (...), in their own precision; NaN beyond `largest_radius`."""
 
     @abstractmethod
     def _bent_by_ray(self, rays: Array) -> Array:
-        """The derivative (..., 2, 2) of the distorted coordinates of rays (..., 2) by the rays."""
+        """Jacobian (..., 2, 2) of the distorted coordinates of rays (..., 2) by the rays."""
 
     @abstractmethod
     def _bent_by_terms(self, rays: Array) -> Array:
-        """The derivative (..., 2, 2) of the distorted coordinates of rays (..., 2) by k1 and k2."""
+        """Jacobian (..., 2, 2) of the distorted coordinates of rays (..., 2) by k1 and k2."""
 
     def border(self, a_side: int) -> Array:
-        """Pixels (4 `a_side`, 2) around the picture, in order, so many on each side."""
+        """Return pixels (4 `a_side`, 2) around the border of the picture, in order, `a_side` of them on each side."""
         width, height = self.size
         across, down = np.linspace(0, width - 1, a_side), np.linspace(0, height - 1, a_side)
         top, right = np.c_[across, 0 * across], np.c_[0 * down + width - 1, down]
@@ -109,12 +111,12 @@ class Lens(ABC):
 
     @property
     def focal_length_px(self) -> float:
-        """The horizontal one."""
+        """Horizontal focal length."""
         return float(self.matrix[0, 0])
 
     @property
     def relative_size(self) -> float:
-        """The longer side of the picture relative to a 4K frame's: what is given in 4K pixels scales by it."""
+        """Ratio of the picture's longer side to that of a 4K frame, by which lengths in 4K pixels scale."""
         return max(self.size) / 3840
 
     @cached_property
@@ -125,7 +127,7 @@ class Lens(ABC):
         return padded
 
     def scaled(self, factor: float) -> Self:
-        """The same lens on a picture resized by `factor`, pixel centres at integers before and after."""
+        """Return the lens of a picture resized by `factor`, pixel centres at integers before and after."""
         width, height = round(self.size[0] * factor), round(self.size[1] * factor)
         matrix = self.matrix.copy()
         for axis, ratio in ((0, width / self.size[0]), (1, height / self.size[1])):
@@ -135,7 +137,7 @@ class Lens(ABC):
         return replace(self, matrix=matrix, size=(width, height), sigma=sigma)
 
     def _within_model(self, rays: Array) -> Array:
-        """Rays (..., 2), NaN beyond `largest_radius`."""
+        """Return rays (..., 2), NaN beyond `largest_radius`."""
         beyond = np.sum(rays * rays, axis=-1, keepdims=True) > self.largest_radius**2
         return np.where(beyond, np.nan, rays)
 
@@ -151,7 +153,7 @@ class Intrinsics(Lens):
     terms: ClassVar[int] = 14
 
     def undistort(self, pixels: ArrayLike, iterations: int = 20) -> Array:
-        """Pixels (..., 2) to undistorted image coordinates at depth 1 (..., 2), by Newton's method from a table.
+        """Return undistorted image coordinates (..., 2) at depth 1 of pixels (..., 2), by Newton's method from a table.
 
         NaN where no ray of the model ends at the pixel.
         """
@@ -209,7 +211,7 @@ class Intrinsics(Lens):
         return self._tilted(*self._bent_upright(x, y))
 
     def _bent_upright(self, x: Plane, y: Plane) -> tuple[Plane, Plane]:
-        """Distorted coordinates (...) of rays (...) on a sensor that is not tilted."""
+        """Return distorted coordinates (...) of rays (...) on a sensor without tilt."""
         k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4 = self.coefficients[:12].tolist()
         r2 = x * x + y * y
         radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
@@ -223,7 +225,7 @@ class Intrinsics(Lens):
         return xd, yd
 
     def _tilted(self, xd: Plane, yd: Plane) -> tuple[Plane, Plane]:
-        """Coordinates (...) on the tilted sensor of those (...) on one that is not."""
+        """Map coordinates (...) on a sensor without tilt to those on the tilted sensor."""
         if not self._is_tilted:
             return xd, yd
         (a, b, c), (d, e, f), (g, h, i) = self.tilt.tolist()
@@ -256,7 +258,8 @@ class Intrinsics(Lens):
         return self._on_tilted(x, y, np.stack([by_k1, by_k1 * r2[..., None]], axis=-1))
 
     def _radial(self, r2: Array) -> tuple[Array, Array, Array]:
-        """Of rays of squared radius `r2` (...): the radial factor, its derivative by `r2`, and its denominator."""
+        """Return the radial factor, its derivative by `r2`, and its denominator, for rays of squared radius `r2`
+        (...)."""
         k1, k2, _, _, k3, k4, k5, k6 = self.coefficients[:8].tolist()
         denominator = 1 + r2 * (k4 + r2 * (k5 + r2 * k6))
         radial = (1 + r2 * (k1 + r2 * (k2 + r2 * k3))) / denominator
@@ -264,7 +267,7 @@ class Intrinsics(Lens):
         return radial, by_r2 / denominator, denominator
 
     def _on_tilted(self, x: Array, y: Array, slopes: Array) -> Array:
-        """Slopes (..., 2, n) of distorted coordinates of rays (...) as they are on the tilted sensor."""
+        """Map a Jacobian (..., 2, n) of distorted coordinates of rays (...) to the tilted sensor."""
         if not self._is_tilted:
             return slopes
         xd, yd = self._bent_upright(x, y)
@@ -278,13 +281,13 @@ class Intrinsics(Lens):
         return bool(self.coefficients[12:].any())
 
     def _pulled_back(self, rays: Array) -> Array:
-        """Rays (..., 2) pulled back to where the radial model still grows: Newton must not jump over its end."""
+        """Return rays (..., 2) limited to where the radial model grows: Newton must not jump over its end."""
         radius = np.linalg.norm(rays, axis=-1, keepdims=True)
         limit = 0.9999 * self.largest_radius
         return np.where(radius > limit, rays * (limit / np.maximum(radius, max(limit, 1e-12))), rays)
 
     def _undistorted_scale(self, distorted_radius: Array) -> Array:
-        """Ratio of undistorted to distorted radius by the radial terms alone: a start for Newton."""
+        """Return the ratio of undistorted to distorted radius by the radial terms alone, to start Newton's method."""
         radii = np.linspace(1e-6, min(self.largest_radius, 20.0), 4000)
         radial, _, _ = self._radial(radii**2)
         return np.interp(distorted_radius, radii * radial, radii) / np.maximum(distorted_radius, 1e-6)
@@ -301,7 +304,7 @@ class Fisheye(Lens):
     terms: ClassVar[int] = 4
 
     def undistort(self, pixels: ArrayLike, iterations: int = 6) -> Array:
-        """Pixels (..., 2) to undistorted image coordinates at depth 1 (..., 2), by Newton's method from a table.
+        """Return undistorted image coordinates (..., 2) at depth 1 of pixels (..., 2), by Newton's method from a table.
 
         NaN where no ray of the model ends at the pixel.
         """
@@ -325,7 +328,7 @@ class Fisheye(Lens):
 
     @cached_property
     def _largest_angle(self) -> float:
-        """Up to which angle (rad) the model grows; `WIDEST_FISHEYE_RAD` at most."""
+        """Largest angle (rad) up to which the model grows, at most `WIDEST_FISHEYE_RAD`."""
         angles = np.linspace(0.0, WIDEST_FISHEYE_RAD, 8901)
         growing = np.diff(self._distorted_angle(angles)) > 0
         return float(angles[-1] if growing.all() else angles[np.argmin(growing)])
@@ -336,7 +339,7 @@ class Fisheye(Lens):
         return angle * (1 + t2 * (k1 + t2 * (k2 + t2 * (k3 + t2 * k4))))
 
     def _angle_slope(self, angle: Array) -> Array:
-        """The derivative of `_distorted_angle`."""
+        """Return the derivative of `_distorted_angle`."""
         k1, k2, k3, k4 = self.coefficients.tolist()
         t2 = angle * angle
         return 1 + t2 * (3 * k1 + t2 * (5 * k2 + t2 * (7 * k3 + t2 * 9 * k4)))
@@ -348,7 +351,7 @@ class Fisheye(Lens):
         return x * scale, y * scale
 
     def _scale(self, radius: Plane, angle: Plane) -> Plane:
-        """Ratio (...) of the distorted radius to the undistorted one."""
+        """Return the ratio (...) of distorted to undistorted radius."""
         # On the axis it is 1, and this far off it still is.
         return np.where(radius > 1e-6, self._distorted_angle(angle) / np.maximum(radius, 1e-6), 1)
 
@@ -364,7 +367,7 @@ class Fisheye(Lens):
         return np.stack([by_k1, by_k1 * (angle * angle)[..., None]], axis=-1)
 
     def _polar(self, rays: Array) -> tuple[Array, Array, Array]:
-        """Of rays (..., 2): the radius (...), the angle (...) off the axis, and the direction (..., 2), 0 on the axis.
+        """Return radius (...), angle (...) off the axis and direction (..., 2), 0 on the axis, of rays (..., 2).
 
         NaN beyond `largest_radius`.
         """

@@ -1,4 +1,4 @@
-"""Which points of the markings a camera sees, and how large they are in its picture."""
+"""Visible points of the markings, and their size in a camera's picture."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class VisibleLines:
 
     @classmethod
     def from_camera(cls, lines: LinePoints, camera: Camera) -> VisibleLines:
-        """The points that fall into the picture."""
+        """Return the line points that fall into the picture."""
         pixel = camera.project(lines.position)
         index = np.flatnonzero(camera.sees(pixel))
         lines, pixel = lines[index], pixel[index]
@@ -79,7 +79,7 @@ class VisibleLines:
         )
 
     def thinned(self, spacing_px: float) -> VisibleLines:
-        """About one point every `spacing_px` along the lines; those kept stand for the length of those dropped."""
+        """Return about one point every `spacing_px` along the lines; each stands for the length of those dropped."""
         walked = np.cumsum(self.length_px)
         kept = np.flatnonzero(np.diff(np.floor(walked / spacing_px), prepend=-1.0) > 0)
         few = self[kept]
