@@ -1,4 +1,4 @@
-"""What a result is worth without ground truth, and the gate that a bad one does not pass."""
+"""Quality gate: judges a result without ground truth, and refuses bad ones."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from worker.calibration.refinement.least_squares import FEWEST_MEASUREMENTS
 from worker.calibration.refinement.uncertainty import Deviation, GroundSigma, RefinedPose
 
 MUCH_UNEXPECTED = 0.4
-"""Of the segmentation on the pitch: so much of it beside all lines of the venue are lines of something else."""
+"""Share of the segmentation on the field beside all lines of the venue from which it shows lines of something else."""
 
 
 @dataclass(frozen=True)
@@ -51,11 +51,12 @@ class Gate:
     highest_ridge_m: float = 3.0
 
     def most_residual_px(self, camera: Camera) -> float:
-        """Rms offset of lines, in pixels of the camera's own frame, up to which a pose fits them."""
+        """Return the largest rms offset of lines, in pixels of the camera's own frame, for a pose that fits them."""
         return max(self.largest_residual_px * camera.intrinsics.relative_size, self.residual_floor_px)
 
     def least_share(self, seen: Evidence) -> float:
-        """Of the markings that has to be seen, 0..1, where chance finds as much as it does."""
+        """Return the least share of the markings that has to be seen, 0..1, with as much found by chance as there
+        is."""
         return seen.by_chance + self.least_agreement * max(1 - seen.by_chance, LEAST_ROOM)
 
 
@@ -79,7 +80,7 @@ Reason = Literal[
 
 @dataclass(frozen=True)
 class Refusal:
-    """Why a pose must not replace the stored one: the `reason` in a word, and in words with numbers and what to do."""
+    """Refusal of a new pose: the `reason` in a word, and in words with numbers and what to do."""
 
     reason: Reason
     words: str
@@ -87,7 +88,8 @@ class Refusal:
 
 @dataclass(frozen=True)
 class Moved:
-    """From the stored pose to the new one: degrees, metres, and the mean shift of the visible markings in pixels."""
+    """Change from the stored pose to the new one: degrees, metres, and the mean shift of the visible markings in
+    pixels."""
 
     rotation_deg: float
     position_m: float
@@ -95,7 +97,7 @@ class Moved:
 
     @classmethod
     def between(cls, pitch: Field, before: Camera, after: Camera) -> Moved:
-        """How far a camera moved."""
+        """Return the change of a camera's pose."""
         lines = pitch.line_points().position
         was = before.project(lines)
         shift = np.linalg.norm(after.project(lines) - was, axis=1)[inside(was, before.intrinsics.size)]
@@ -107,11 +109,11 @@ class Moved:
         )
 
     def beyond(self, gate: Gate) -> bool:
-        """Whether it is more than a camera may move without somebody storing a new pose."""
+        """True if the change is larger than is allowed without somebody storing a new pose."""
         return self.rotation_deg > gate.largest_rotation_deg or self.position_m > gate.largest_shift_m
 
     def words(self, gate: Gate) -> str:
-        """How far it moved, and the limits."""
+        """Return the change in words, and the limits."""
         return (
             f"turned by {self.rotation_deg:.1f} degrees (at most {gate.largest_rotation_deg} allowed) and moved by "
             f"{self.position_m:.2f} m (at most {gate.largest_shift_m})"
@@ -120,7 +122,7 @@ class Moved:
 
 @dataclass(frozen=True)
 class CameraResult(RefinedPose):
-    """One camera's answer, which the gate looks at: what the finish found, and what it is worth beside the stored pose.
+    """Result for one camera, which the gate judges: its refined pose, and what it is worth beside the stored one.
 
     `view`: whether its frame could be used, and what is wrong with it if not; `overlap`: of expected lines and the
     segmentation; `evidence_before`: computes that at the stored pose, lazily, since a good answer needs none;
@@ -142,12 +144,12 @@ class CameraResult(RefinedPose):
 
     @property
     def accepted(self) -> bool:
-        """Whether the gate lets its pose replace the stored one."""
+        """True if the gate lets the pose replace the stored one."""
         return self.refusal is None
 
     @property
     def rejected_because(self) -> str | None:
-        """The words of its refusal."""
+        """Words of the refusal."""
         return None if self.refusal is None else self.refusal.words
 
 
@@ -163,14 +165,14 @@ def in_one_sentence(reasons: Sequence[str]) -> str:
 def credible_deviations(
     deviations: Sequence[Deviation], results: Sequence[CameraResult], gate: Gate
 ) -> list[Deviation]:
-    """Those deviations that were read off cameras which see the pitch where they expect it."""
+    """Return the deviations that were read off cameras which see the field where they expect it."""
     lost = {result.camera.id for result in results if result.evidence.agreement < gate.least_agreement}
     of_field = not lost or any(result.accepted for result in results)
     return [d for d in deviations if (of_field if d.camera is None else d.camera not in lost)]
 
 
 def ridge_rejection(pitch: Field, gate: Gate) -> Refusal | None:
-    """Why a pitch whose ridge was found along with the poses cannot be one; None when it can."""
+    """Return the refusal of a field whose ridge was found along with the poses and cannot be one; None when it can."""
     height = 0.0 if pitch.ridge is None else float(pitch.ridge[0, 2])
     if 0 <= height <= gate.highest_ridge_m:
         return None
@@ -182,7 +184,7 @@ def ridge_rejection(pitch: Field, gate: Gate) -> Refusal | None:
 
 
 def alone_rejection(result: CameraResult, gate: Gate) -> Refusal | None:
-    """Why a camera's pose must not replace the stored one whatever the others say, and what to do; None when it may."""
+    """Return the refusal of a camera's pose whatever the others say; None when it may replace the stored one."""
     if not result.view.usable:
         return Refusal(_reason_of(result.view), result.view.words)
     moved, seen = result.moved, result.evidence
@@ -260,7 +262,7 @@ def _why_undetermined(ground: GroundSigma | None, gate: Gate) -> str | None:
 
 
 def _reason_of(view: ViewCondition) -> Reason:
-    """What the picture shows is one reason, whatever it is; what it is of, and where its pose looks, are others."""
+    """Return the reason of an unusable view: `view` for all that the picture itself shows."""
     match view.cause:
         case "other-camera" | "no-markings-in-view" as reason:
             return reason
@@ -269,7 +271,7 @@ def _reason_of(view: ViewCondition) -> Reason:
 
 
 def _other_lines(result: CameraResult) -> list[str]:
-    """What to do about lines that are not the venue's, where there are many."""
+    """Return what to do about lines that are not the venue's, where there are many."""
     if not films_a_field(result.camera.pose):
         return [
             "from such a pose no field is filmed (it hangs upside down, or far away): was it written in another "
@@ -286,13 +288,13 @@ def _other_lines(result: CameraResult) -> list[str]:
 
 
 def zoomed_beyond_doubt(result: CameraResult, gate: Gate) -> bool:
-    """Whether the lines contradict the focal length, and the pose with it: either alone may be chance."""
+    """True if the lines contradict the focal length, and the pose with it: either alone may be chance."""
     sure = result.zoom is not None and is_sure(result.zoom)
     return sure and result.zoom_shift_m > gate.largest_zoomed_m
 
 
 def zoom_in_words(camera: Camera, zoom: Deviation) -> str:
-    """By how much the focal length is not what the venue says."""
+    """Return in words how far the focal length is from what the venue says."""
     focal = camera.intrinsics.focal_length_px
     by = f"{abs(zoom.value) / focal:.2%} ± {zoom.sigma / focal:.2%}"
     return f"the lines fit a focal length {by} {'longer' if zoom.value > 0 else 'shorter'} than the venue says"

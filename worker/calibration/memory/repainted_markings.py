@@ -1,4 +1,4 @@
-"""Markings that have been painted anew, elsewhere: told from a camera that moved and from a zoom.
+"""Repainted markings: told from a camera that moved and from a zoom.
 
 Between two nights the wind moves a camera a little; somebody may have touched it, its focal length may have changed,
 and single markings may lie elsewhere. What lens, ground and paint have wrong is the same in both nights and cancels, so
@@ -24,20 +24,20 @@ from worker.calibration.memory.epoch import SAME_VIEW_PX, Epoch
 from worker.calibration.robust import HUBER, robust_scale
 
 LEAST_M, LEAST_PX = 0.025, 0.5
-"""A marking that has moved by more than both, pixels of a 4K frame, has been painted anew ..."""
+"""Least move of a repainted marking, in metres and in pixels of a 4K frame."""
 FEWEST_POINTS, MOST_MARKINGS = 8, 0.34
-"""... if so many of its points were measured in both nights, and no larger part of all markings has: else it is not
-the paint."""
+"""Fewest points of a repainted marking measured in both nights, and largest part of all markings that may have
+moved: else it is not the paint."""
 LEAST_GAIN = 30.0
-"""Half the sum of squares, in units of the expected errors, that a change has to explain to be one."""
+"""Half the sum of squares, in units of the expected errors, that a change has to explain to be accepted."""
 ROUNDS = 4
 HELD, TINY = 1e-9, 1e-12
 
 
 def find_repainted_markings(memory: CameraMemory, measured: Measurements, lines: LinePoints) -> NDArray[np.intp]:
-    """The markings whose paint lies elsewhere than in the first nights, where the lines are `measured` tonight.
+    """Return the markings whose paint lies elsewhere than in the first nights, where the lines are `measured` tonight.
 
-    Those that the memory says so of stay among them: nobody knows better where they are supposed to lie.
+    Markings that the memory already says are repainted stay among them: their true place is unknown.
     """
     known = np.array(memory.repainted_markings, dtype=np.intp)
     camera = memory.last.camera
@@ -59,7 +59,7 @@ def find_repainted_markings(memory: CameraMemory, measured: Measurements, lines:
 
 @dataclass(frozen=True)
 class _Differences:
-    """How far (M,) px the lines of tonight are beside those of an epoch, measured from where its camera puts them.
+    """Differences (M,) px between tonight's lines and those of an epoch, seen from the epoch's camera.
 
     `marking` (M,); `slopes` (M, 6) of the offset, px per rad and metre of the pose; `longer` (M,) px when the focal
     length doubles; `across` (M,) px per metre.
@@ -73,7 +73,7 @@ class _Differences:
 
     @classmethod
     def between(cls, last: Epoch, measured: Measurements, lines: LinePoints) -> _Differences:
-        """The differences at the line points that were measured well in the epoch and tonight."""
+        """Return the differences at the line points that were measured well in the epoch and tonight."""
         index, tonight, before = np.intersect1d(measured.index, last.index, return_indices=True)
         measured, camera, positions = measured[tonight], last.camera, lines.position[index]
         offset = measured.offset(camera, positions) - last.offset[before]
@@ -87,11 +87,12 @@ class _Differences:
 
     @property
     def usual_px(self) -> float:
-        """How far a line is from where it was, mostly."""
+        """Median distance of a line from its earlier place."""
         return float(np.median(np.abs(self.offset))) if len(self.offset) else np.inf
 
     def explained_by(self, candidates: NDArray[np.intp]) -> dict[int, float]:
-        """Which markings have moved, and by how many metres, where camera and focal length may have changed as well."""
+        """Return the markings that have moved, and by how many metres, where camera and focal length may have
+        changed as well."""
         open_to: dict[int | str, Array] = {"zoomed": self.longer[:, None], "touched": self.slopes}
         for marking in candidates.tolist():
             open_to[marking] = (self.across * (self.marking == marking))[:, None]
@@ -110,14 +111,15 @@ class _Differences:
         return {name: -float(by[0]) for name, by in zip(taken, parts, strict=False) if isinstance(name, int)}
 
     def _sigma_px(self, columns: Sequence[Array]) -> float:
-        """Error of a difference: of two measurements, or more where even all changes together leave more."""
+        """Return the standard deviation of a difference: of two measurements, or more where even all changes leave
+        more."""
         usual = float(np.hypot(NOISE_PX, NOISE_PX))
         _, change = self._fitted(columns, usual)
         return usual * robust_scale((self.offset + np.concatenate([self.slopes, *columns], axis=1) @ change) / usual)
 
     def _fitted(self, columns: Sequence[Array], sigma_px: float) -> tuple[float, Array]:
-        """Huber's loss where the change (6 + n,) of the pose, by wind, and of `columns` (M, n) in all makes it least,
-        and that change."""
+        """Return Huber's loss and the change (6 + n,) of the pose, by wind, and of `columns` (M, n) in all that
+        minimises it."""
         jacobian = np.concatenate([self.slopes, *columns], axis=1) / sigma_px
         known = np.eye(POSE_NUMBERS, jacobian.shape[1]) / WIND[:, None]
         scale = np.maximum(np.linalg.norm(jacobian, axis=0), TINY)

@@ -1,4 +1,4 @@
-"""Steps that learn from the ones before: Anderson's mixing (1965; Walker and Ni, 2011).
+"""Anderson mixing of steps (1965; Walker and Ni, 2011).
 
 Weights, the unevenness of the ground and what is matched follow the poses only one step behind, so Gauss-Newton alone
 comes nearer by a quarter a step. What the last steps left over says where that leads.
@@ -17,15 +17,15 @@ from worker.calibration.refinement.estimate import TURN_M, Estimate, GaussNewton
 from worker.calibration.refinement.unknowns import Unknowns
 
 DEPTH = 3
-"""How many of the steps before are looked at."""
+"""Number of earlier steps that are mixed."""
 HELD = 1e-3
-"""Steps that are alike to this part say nothing new."""
+"""Relative singular value below which changes between steps are taken to be alike."""
 FARTHEST = 4.0
-"""A mixed step is not longer than so many times the plain one."""
+"""Longest mixed step, in multiples of the plain one."""
 
 
 class MixedSteps:
-    """Steps towards one place, each mixed with the ones before."""
+    """Steps towards a fixed point, each mixed with the ones before."""
 
     def __init__(self, unknowns: Unknowns) -> None:
         self._unknowns = unknowns
@@ -35,7 +35,7 @@ class MixedSteps:
         self._taken: list[Array] = []
 
     def step(self, here: Estimate, made: GaussNewtonStep) -> Estimate:
-        """Where to go from `here`, where the plain step was `made`."""
+        """Return the next estimate after `here`, whose plain step was `made`."""
         move = self._mixed(made.move)
         self._plain.append(made.move)
         self._taken.append(move)
@@ -54,5 +54,5 @@ class MixedSteps:
         return mixed if np.linalg.norm(self._in_metres(mixed)) <= longest else plain
 
     def _in_metres(self, moves: Array) -> Array:
-        """The part (6 V, ...) of moves (U, ...) that the cameras make, turns as shifts of what they see."""
+        """Return the poses' part (6 V, ...) of moves (U, ...) in metres: turns as shifts at `TURN_M`."""
         return np.asarray((moves[: self._poses].T * self._scale).T)

@@ -1,9 +1,9 @@
-"""Whether sigmas are as large as errors: a camera by one half of its lines beside the same camera by the other half.
+"""Cross-check of sigmas: a camera by one half of its lines against the same camera by the other half.
 
 Every line is cut into stretches of ten metres; the even ones find pose and lens without the odd ones, and the other way
 round. How far apart the two put the farthest marking is a difference that anybody can check, and no sum of squares that
-both have part in. It should be about as large as the sigmas of both say, and much larger only where those are too
-small (mrcal calls this cross-validation; Kogan, "mrcal", 2021).
+both have part in. It should be about as large as the sigmas of both say, and much larger only where those are too small
+(mrcal calls this cross-validation; Kogan, "mrcal", 2021).
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ from worker.calibration.refinement.variance_components import Posterior
 
 @dataclass(frozen=True)
 class CrossCheck:
-    """How far apart (m, on the ground) the two halves of the lines put the farthest marking in view of a camera.
+    """Distance (m, on the ground) between the places of the farthest marking in view by the two halves of the lines.
 
-    `expected_m`: how far the sigmas of both say, one standard deviation.
+    `expected_m`: one standard deviation of it by the sigmas of both halves.
     """
 
     apart_m: float
@@ -39,9 +39,10 @@ class CrossCheck:
 
 
 class CrossChecks:
-    """Everything by the even stretches of the lines of tonight, and by the odd ones, at the scales that all chose.
+    """Split-half posteriors: independent errors by the even and by the odd stretches of tonight's lines, at the prior
+    scales of the full fit.
 
-    It is worked out when it is first asked for: only the finish whose answer is kept needs it.
+    Computed on first use: only the refinement whose answer is kept needs it.
     """
 
     def __init__(
@@ -52,7 +53,7 @@ class CrossChecks:
         found: Posterior,
         heights: Array,
     ) -> None:
-        """`found` (A,) by all lines, on a ground of `heights` (K,)."""
+        """Take `found` (A,), the posterior by all lines, on a ground of `heights` (K,)."""
         self._here, self._believed, self._found, self._heights = here, believed, found, heights
         self._halves = [[its[_stretch(its) % 2 == half] for its in measured] for half in (0, 1)]
 
@@ -67,7 +68,7 @@ class CrossChecks:
 
     @cached_property
     def _difference(self) -> tuple[Array, Array]:
-        """How far apart (A,) the two halves put the errors, and the covariance (A, A) that this is expected to have."""
+        """Difference (A,) between the errors by the two halves, and the covariance (A, A) expected of it."""
         here, believed, found, heights = self._here, self._believed, self._found, self._heights
         changes = believed.mixing @ found.value
         # The ground is one unknown more: what it swells by is the same under both halves.
@@ -90,7 +91,8 @@ class CrossChecks:
 
 
 def cross_check(pitch: Field, camera: Camera, difference: Array, covariance: Array) -> CrossCheck | None:
-    """What a `difference` (12,) of pose and `LENS_NUMBERS`, of this covariance (12, 12), is at the farthest marking."""
+    """Propagate a `difference` (12,) of pose and `LENS_NUMBERS`, of this covariance (12, 12), to the farthest
+    marking."""
     slopes = ground_slopes_of_all(camera, farthest_marking(pitch, camera))
     apart = np.linalg.norm(slopes @ difference, axis=-1)
     variance = np.einsum("nij,jk,nik->n", slopes, covariance, slopes)
@@ -101,14 +103,14 @@ def cross_check(pitch: Field, camera: Camera, difference: Array, covariance: Arr
 
 
 def _stretch(measured: Measurements) -> NDArray[np.intp]:
-    """In which ten metres of line (M,) each was measured."""
+    """Return the index (M,) of the ten metres of line in which each point was measured."""
     return measured.index // CLUSTER_POINTS
 
 
 def _with_ground(mixing: Array, certainty: Array, ground: Array) -> tuple[Array, Array]:
-    """The mixing (D + K, A + K) and prior information (A + K, A + K) of the errors, those of the ground among them.
+    """Return mixing (D + K, A + K) and prior information (A + K, A + K) of the errors with the ground among them.
 
-    `certainty` (A,) on the errors, `ground` (K, K) on the heights.
+    `certainty` (A,): information on the errors, `ground` (K, K): on the heights.
     """
     (dense, errors), nodes = mixing.shape, len(ground)
     both, prior = np.zeros((dense + nodes, errors + nodes)), np.zeros((errors + nodes, errors + nodes))

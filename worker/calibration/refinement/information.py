@@ -1,4 +1,4 @@
-"""What the lines say of poses, lenses and field: tonight's, and those that are remembered.
+"""Information of the lines on poses, lenses and field: of tonight's lines, and of remembered ones.
 
 Every epoch of a memory is one more view, with the mean of what it measured; it shares lens, ground and paint with the
 view of tonight, so that what they have in common is known once and not twice (docs/model.md, 4).
@@ -29,12 +29,12 @@ from worker.calibration.refinement.unknowns import Unknowns
 from worker.calibration.robust import tukey_slopes, tukey_weights
 
 LEAST_HELD, TINY = 1e-9, 1e-300
-"""Directions of which the lines say less than this part of what they say of single numbers are said nothing of."""
+"""Relative eigenvalue of the information below which a direction is taken to be unknown."""
 
 
 @dataclass(frozen=True)
 class MarginalInformation:
-    """What lines say of changes of the dense unknowns (D,), whatever the ground: `known` (D, D) and `pull` (D,).
+    """Information on changes of the dense unknowns (D,) with the ground marginalised: `known` (D, D) and `pull` (D,).
 
     `level` (K,) and `tilt` (K, D): the heights of the ground are `level - tilt @ changes`. `repeated`: covariance of
     tonight's poses by tonight's measurement alone.
@@ -47,15 +47,14 @@ class MarginalInformation:
     repeated: Array
 
     def heights(self, changes: Array) -> Array:
-        """The likeliest heights (K,) of the ground after changes (D,)."""
+        """Return the likeliest heights (K,) of the ground after changes (D,)."""
         return self.level - self.tilt @ changes
 
 
 @dataclass(frozen=True)
 class Sandwich:
-    """What lines say of changes of all unknowns (U,): of half the robust loss the `gradient` (U,), how that changes
-    with the unknowns, `bread` (U, U), and how it varies from one measurement of the lines to another, `spread` (U, U).
-    """
+    """Derivatives of half the robust loss by all unknowns (U,): the `gradient` (U,), its Jacobian `bread` (U, U),
+    and `spread` (U, U), its covariance from one measurement of the lines to another."""
 
     bread: Array
     gradient: Array
@@ -63,16 +62,16 @@ class Sandwich:
 
     @classmethod
     def of(cls, rows: Sequence[Rows], heights: Array, unknowns: Unknowns) -> Sandwich:
-        """Sum up what rows say on a ground of `heights` (K,)."""
+        """Sum up rows on a ground of `heights` (K,)."""
         flat = weigh_rows(rows, heights, unknowns, tukey_weights)
         equations = normal_equations(flat)
         steep = normal_equations(weigh_rows(rows, heights, unknowns, tukey_slopes))
         return cls(steep.information, equations.gradient, error_of_measurement(flat, equations.information))
 
     def covariance_of_poses(self, here: Estimate) -> Array:
-        """Covariance (6 C, 6 C) of the poses of tonight by the measurement alone.
+        """Return the covariance (6 C, 6 C) of tonight's poses by the measurement alone.
 
-        By how the pull of the residuals varies, between how the pull changes with the unknowns: Huber's sandwich.
+        Huber's sandwich: the covariance of the gradient, between inverses of its Jacobian.
         """
         weak = here.weak_prior()
         poses = len(weak)
@@ -81,7 +80,7 @@ class Sandwich:
 
 
 class LineLikelihood:
-    """The lines of tonight, and those that are remembered, beside an estimate of everything."""
+    """Likelihood of tonight's and the remembered lines around an estimate."""
 
     def __init__(
         self,
@@ -95,11 +94,11 @@ class LineLikelihood:
         self._remembered = _remembered(here, memories, unknowns)
 
     def information(self) -> MarginalInformation:
-        """What they say, weighed by how far they are from the estimate."""
+        """Return the information at the estimate."""
         return self.information_at(np.zeros(self._unknowns.dense), self._here.heights)
 
     def information_at(self, changes: Array, heights: Array) -> MarginalInformation:
-        """What they say, weighed by how far they are from it after changes (D,), on a ground of `heights` (K,).
+        """Return the information after changes (D,) from the estimate, on a ground of `heights` (K,).
 
         An error of a lens that is known by now is no error of the measurements.
         """
@@ -126,13 +125,13 @@ class LineLikelihood:
         return MarginalInformation(believed, drawn + believed @ changes, risen + effect @ changes, effect, repeated)
 
     def sandwich_at(self, changes: Array, heights: Array) -> Sandwich:
-        """Sum up what the lines say of all unknowns after changes (D,), on a ground of `heights` (K,)."""
+        """Sum up all lines after changes (D,), on a ground of `heights` (K,)."""
         rows = [rows.shifted(changes, heights, self._unknowns) for rows in (*self._tonight, *self._remembered)]
         return Sandwich.of(rows, heights, self._unknowns)
 
 
 def _remembered(here: Estimate, memories: Sequence[CameraMemory | None], unknowns: Unknowns) -> list[Rows]:
-    """The rows of all epochs, in the order of their views."""
+    """Return the rows of all epochs, in the order of their views."""
     rows, view = [], len(here.cameras)
     for camera, memory in zip(here.cameras, memories, strict=True):
         for epoch in () if memory is None else memory.epochs:
@@ -149,7 +148,7 @@ def _remembered(here: Estimate, memories: Sequence[CameraMemory | None], unknown
 
 
 def _by_lens(rows: Rows, unknowns: Unknowns, view: int, differs: Array) -> Array:
-    """How much (M,) px the offsets of a view change when `LENS_NUMBERS` (6,) of its lens do."""
+    """Return the change (M,) px of a view's offsets when `LENS_NUMBERS` (6,) of its lens change by `differs`."""
     changed = np.zeros(len(rows.offset))
     owner = unknowns.lenses[view][0] if unknowns.lenses else view
     for column, (_, parameter) in enumerate(unknowns.parameters_of(view), POSE_NUMBERS):
@@ -159,10 +158,10 @@ def _by_lens(rows: Rows, unknowns: Unknowns, view: int, differs: Array) -> Array
 
 
 def _believed(information: Array, pull: Array, spread: Array) -> tuple[Array, Array]:
-    """The `information` (A, A) that is left when the `pull` (A,) varies by `spread` (A, A) and not by as much as that,
-    and the pull to the same place that goes with it.
+    """Return the `information` (A, A) that is left when the `pull` (A,) varies by `spread` (A, A) instead of by as much
+    as that, and the pull to the same place that goes with it.
 
-    Few patches of line say little of how it varies in any one direction, so it is drawn to what it does on average.
+    A few patches of line say little of the variance in any one direction, so it is shrunk to the mean variance.
     """
     scale = np.sqrt(np.maximum(np.diag(information), TINY))
     values, vectors = np.linalg.eigh(information / np.outer(scale, scale))

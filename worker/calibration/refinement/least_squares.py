@@ -1,4 +1,4 @@
-"""The least squares of the finish: line measurements of several views, with their unknown errors of paint and ground.
+"""Least squares of the refinement: line measurements of several views, with their unknown errors of paint and ground.
 
 The offset of a measured line point from where its view expects it is (docs/model.md, 2)
 
@@ -29,16 +29,16 @@ from worker.calibration.robust import USUAL, Weigh, tukey_weights
 
 FEWEST_MEASUREMENTS = 30
 CLUSTER_POINTS = 40
-"""Line points (25 cm apart) whose errors of paint, lens and measurement are taken as one."""
+"""Number of line points (25 cm apart) whose errors of paint, lens and measurement are taken as one."""
 LEAST_BELIEF = 1e-3
-"""A line point whose rows are all disbelieved may lie anywhere."""
+"""Least mean weight of a line point's rows: a point whose rows are all outliers may lie anywhere."""
 LEAST_NOISE = 0.2
-"""Part of the expected errors that the gradient varies by at least: no picture is perfect."""
+"""Least part of the expected errors by which the gradient varies: no picture is perfect."""
 
 
 @dataclass(frozen=True)
 class Rows:
-    """M measurements of one view against its pose.
+    """M measurements of one view, linearised at its pose.
 
     `offset` (M,) px, measured minus expected; `jacobian` (M, n) of it by the dense unknowns `columns` (n,); `across`
     and `up` (M,) px per metre of paint that lies beside its place, or above it; `noise_px` (M,); `trust` (M,) 0..1;
@@ -56,9 +56,9 @@ class Rows:
     measured: Measurements
 
     def shifted(self, changes: Array, heights: Array, unknowns: Unknowns) -> Rows:
-        """The same rows after changes (D,) of the dense unknowns, on a ground of `heights` (K,).
+        """Return the rows after changes (D,) of the dense unknowns, on a ground of `heights` (K,).
 
-        What nothing explains is less where a lens that was wrong has been put right.
+        The misfit is smaller where a lens that was wrong has been corrected.
         """
         offset = self.offset + self.jacobian @ changes[self.columns]
         left = offset - self.up * unknowns.ground.under_points(heights, self.point)
@@ -67,7 +67,7 @@ class Rows:
 
     @classmethod
     def of(cls, positions: Array, camera: Camera, view: int, measured: Measurements, unknowns: Unknowns) -> Rows:
-        """The measurements of view number `view`; `positions` (N, 3): where the field has its line points."""
+        """Return the rows of view number `view`; `positions` (N, 3): places of the field's line points."""
         here = positions[measured.index]
         parameters = unknowns.parameters_of(view)
         columns = np.array([*range(*unknowns.pose(view).indices(len(unknowns))), *(n for n, _ in parameters)], np.intp)
@@ -93,7 +93,7 @@ class Rows:
 def _by_parameters(
     by_pose: Array, points: Array, camera: Camera, measured: Measurements, parameters: Sequence[Parameter]
 ) -> Array:
-    """The derivative (M, E) of the offsets from `points` (M, 3) by numbers of lens and field, px per unit of each.
+    """Jacobian (M, E) of the offsets from `points` (M, 3) by parameters of lens and field, px per unit of each.
 
     `by_pose` (M, 6): that by the pose.
     """
@@ -111,7 +111,8 @@ def _by_parameters(
 def rows_of(
     positions: Array, cameras: Sequence[Camera], measured: Sequence[Measurements], unknowns: Unknowns
 ) -> list[Rows]:
-    """The rows of all views that have enough measurements; `positions` (N, 3): where the field has its line points."""
+    """Return the rows of all views that have enough measurements; `positions` (N, 3): places of the field's line
+    points."""
     return [
         Rows.of(positions, camera, view, found, unknowns)
         for view, (camera, found) in enumerate(zip(cameras, measured, strict=True))
@@ -123,11 +124,11 @@ def rows_of(
 class WeightedRows:
     """Rows of several views with their weights, on a ground of known heights; M rows of all views, P line points.
 
-    `residual` (M,) px; `points` (P,) and `at` (M,): which of the line points the rows are about; `shared` (M,): whether
+    `residual` (M,) px; `points` (P,) and `at` (M,): which of the line points the rows are about; `shared` (M,): True if
     other rows are about the same one; `weight` (M,) 1 / px²: of a shared point that of the measurement alone, of
     another with all that it may be off by. `local` (M, 2) px per metre of (e, r); `precision` (P, 2, 2) of those given
-    the rows, and `beside` (P, 2) m, what they then are. `value` (M,): the residual in units of everything it may be
-    off by, and `belief` (M,), its robust weight.
+    the rows, and `beside` (P, 2) m, their mean. `value` (M,): the residual in units of everything it may be off by, and
+    `belief` (M,), its robust weight.
     """
 
     rows: Sequence[Rows]
@@ -144,7 +145,7 @@ class WeightedRows:
     belief: Array
 
     def parts(self) -> list[slice]:
-        """Which of the M rows are those of each view."""
+        """Return the slice of the M rows of each view."""
         ends = np.cumsum([0, *(len(rows.offset) for rows in self.rows)]).tolist()
         return [slice(first, last) for first, last in pairwise(ends)]
 
@@ -155,8 +156,8 @@ class WeightedRows:
 
     @property
     def drawn_together(self) -> Array:
-        """How much (M, 2) the rows of a shared point give way to each other: the products of two rows say by how much
-        the point, wherever it lies, takes from what they tell apart; 0 of a point that one view alone measures."""
+        """Factor (M, 2) of the rank-2 term that eliminating a shared point's paint error subtracts from its rows'
+        information; 0 for a point that one view alone measures."""
         drawn = np.zeros((len(self.at), 2))
         at = self.at[self.shared]
         root = np.linalg.cholesky(np.linalg.inv(self.precision))[at]
@@ -166,7 +167,7 @@ class WeightedRows:
 
     @property
     def left(self) -> Array:
-        """What is left (M,) px of the residuals of shared points when those lie where all their rows say together."""
+        """Residuals (M,) px given the paint: with shared points at the mean place that all their rows say."""
         return self.residual - self.shared * np.sum(self.local * self.beside[self.at], axis=1)
 
 
@@ -174,7 +175,7 @@ def weigh_rows(rows: Sequence[Rows], heights: Array, unknowns: Unknowns, weigh: 
     """Weigh rows robustly: each by all that it may be off by, and those that share a point by each other.
 
     Where a shared point is far off in the views that see it alike, it is the paint and not the measurements: it may lie
-    farther beside its place, and they say no less about each other. `heights` (K,): of the ground's nodes.
+    farther from its place, and they say no less about each other. `heights` (K,): of the ground's nodes.
     """
     ground = unknowns.ground
     point = _joined([r.point for r in rows]).astype(np.intp)
@@ -202,9 +203,9 @@ def weigh_rows(rows: Sequence[Rows], heights: Array, unknowns: Unknowns, weigh: 
 
 
 def _beside(local: Array, weight: Array, residual: Array, at: NDArray[np.intp], variance: Array) -> tuple[Array, Array]:
-    """Precision (P, 2, 2) and mean (P, 2), m, of what each line point is off by, if all else is right.
+    """Return precision (P, 2, 2) and mean (P, 2), m, of each line point's paint error, all else fixed.
 
-    `variance` (P, 2) m²: of that before it is measured.
+    `variance` (P, 2) m²: the prior of it.
     """
     count = len(variance)
     precision = np.empty((count, 2, 2))
@@ -217,17 +218,17 @@ def _beside(local: Array, weight: Array, residual: Array, at: NDArray[np.intp], 
 
 @dataclass(frozen=True)
 class NormalEquations:
-    """`information` (U, U) on all unknowns and the `gradient` (U,) of half the weighted squares."""
+    """Normal equations: `information` (U, U) on all unknowns and the `gradient` (U,) of half the weighted squares."""
 
     information: Array
     gradient: Array
 
 
 def normal_equations(of: WeightedRows) -> NormalEquations:
-    """The sums over all rows, paint and roughness of each line point eliminated (docs/model.md, 3).
+    """Sum the normal equations over all rows, the paint error of each line point eliminated (docs/model.md, 3).
 
-    All rows of a line point move with the ground under it, which is summed by points; poses and numbers are summed by
-    views, and by pairs of views that share points.
+    All rows of a line point move with the ground under it, which is summed by points; poses and parameters are summed
+    by views, and by pairs of views that share points.
     """
     unknowns, dense = of.unknowns, of.unknowns.dense
     drawn = of.drawn_together
@@ -259,14 +260,15 @@ def normal_equations(of: WeightedRows) -> NormalEquations:
 
 
 def _by_node(ground: Ground, points: NDArray[np.intp], values: Array) -> Array:
-    """Values (M, n) at line points (M,), shared out between the nodes (K, n) of the ground under them."""
+    """Distribute values (M, n) at line points (M,) over the nodes (K, n) of the ground under them."""
     node, share = ground.node[points].ravel(), ground.share[points]
     by_column = [_summed(node, (share * column[:, None]).ravel(), len(ground)) for column in values.T]
     return np.stack(by_column, axis=1) if by_column else np.zeros((len(ground), 0))
 
 
 def _between_nodes(ground: Ground, points: NDArray[np.intp], values: Array) -> Array:
-    """The sum (K, K) over line points (P,) of a value (P,) times the outer square of their shares of the nodes."""
+    """Return the sum (K, K) over line points (P,) of a value (P,) times the outer square of their shares of the
+    nodes."""
     node, share, size = ground.node[points], ground.share[points], len(ground)
     pair = node[:, :, None] * size + node[:, None, :]
     squares = values[:, None, None] * share[:, :, None] * share[:, None, :]
@@ -274,12 +276,12 @@ def _between_nodes(ground: Ground, points: NDArray[np.intp], values: Array) -> A
 
 
 def _summed(at: NDArray[np.intp], values: Array, size: int) -> Array:
-    """Values (M,) added up by where (M,) each belongs, (size,)."""
+    """Return sums (size,) of values (M,) by their index (M,)."""
     return np.asarray(np.bincount(at, values, size), dtype=float)
 
 
 def error_of_measurement(of: WeightedRows, information: Array) -> Array:
-    """Covariance (U, U) of the gradient by the residuals themselves, those of ten metres of line taken as one.
+    """Return the covariance (U, U) of the gradient by the residuals themselves, clustered by ten metres of line.
 
     Neighbours on a line share the error of its paint and of the lens, so they are not as many as they seem (the
     sandwich of Liang and Zeger, 1986). On top, a fifth of what their expected errors say.
@@ -290,7 +292,7 @@ def error_of_measurement(of: WeightedRows, information: Array) -> Array:
 
 
 def _pulls(of: WeightedRows) -> Array:
-    """The part (C, U) of the gradient that each ten metres of line have, over all views."""
+    """Return the part (C, U) of the gradient of each ten metres of line, over all views."""
     unknowns, ground = of.unknowns, of.unknowns.ground
     clusters, cluster_of = np.unique(of.points // CLUSTER_POINTS, return_inverse=True)
     count, size = len(clusters), len(ground)
@@ -315,7 +317,7 @@ def _split(values: Array, rows: Sequence[Rows]) -> list[Array]:
 
 
 def rms_px(positions: Array, camera: Camera, measured: Measurements) -> float | None:
-    """Rms of the distances of the lines of one camera from the field's `positions` (N, 3), but for outliers.
+    """Return the rms distance of the lines of one camera from the field's `positions` (N, 3), without outliers.
 
     None where it has too few.
     """
@@ -329,7 +331,7 @@ def rms_px(positions: Array, camera: Camera, measured: Measurements) -> float | 
 
 
 def misfit_px(offset: Array, measured: Measurements) -> float:
-    """The further error, in px, that makes the usual one of the offsets (M,) of measurements what is expected.
+    """Return the further error, in px, that makes the usual offset (M,) of measurements the expected one.
 
     0 where noise, paint and ground explain them. By the median: outliers say nothing of how well a lens is known.
     """

@@ -1,4 +1,4 @@
-"""What is believed of cameras before tonight's lines are asked: movement, lenses, field, and what is remembered.
+"""Priors of cameras before tonight's lines: movement, lenses, field, and memories.
 
 Dense unknowns x of the least squares (poses of all views, numbers of lenses and field) are sums of independent errors
 z: x = `mixing` z (docs/model.md, 5). A camera without a memory has three: how far it moved and how much it was zoomed
@@ -34,39 +34,40 @@ from worker.calibration.refinement.unknowns import Unknowns
 from worker.calibration.refinement.variance_components import Group
 
 MOVED_RAD, MOVED_M = 0.01, 0.1
-"""How far a camera that has moved is expected to be from where it was, per axis, ..."""
+"""Expected movement of a camera that has moved, per axis, at scale 1."""
 MOVEMENT_SCALES: Array = 0.3 * 2.0 ** np.arange(7.0)
-"""...times one of these: wind and heat move every camera a little."""
+"""Possible scales of a movement: wind and heat move every camera a little."""
 FOCAL_SCALES: Array = 2.0 ** np.arange(8.0)
-"""A focal length is off by what is expected of it, or by so many times more; never by less: lines that fit say little
-of it. A zoom ring moves it by far more than that, ..."""
+"""Possible scales of a focal length's error; none below 1, since lines that fit say little of it. A zoom ring needs
+the largest."""
 UNSTATED_ODDS, STATED_ODDS = FOCAL_SCALES**0.0, FOCAL_SCALES**-3.0
-"""Odds of these scales for a lens before any line: where nobody said how far it may be off, none is likelier than
-another; a sigma that was said is wrong twofold one time in nine."""
+"""Prior odds of `FOCAL_SCALES`: equal for a lens whose sigma nobody stated; a stated sigma is wrong twofold one time
+in nine."""
 LENS_SCALES: Array = 2.0 ** np.arange(6.0)
-"""... and nothing moves the rest of a lens so far; but what squeezes pictures moves the aspect by as much."""
+"""Possible scales of the errors of the rest of a lens: nothing moves it as far as a zoom ring the focal length, but
+what squeezes pictures moves the aspect by as much."""
 FIELD_SCALES: Array = 2.0 ** np.arange(-3.0, 7.0)
-"""A measure of the field may have been taken better than expected, or worse, ..."""
+"""Possible scales of a field measure's error: it may have been taken better than expected, or worse."""
 FIELD_ODDS = np.minimum(FIELD_SCALES, 1 / FIELD_SCALES) ** 3.0
-"""...but lines that hardly show it are no reason to think so."""
+"""Prior odds of `FIELD_SCALES`: lines that hardly show a measure are no reason to think it better or worse."""
 LEAST_WIND = 1 / 3
-"""Of that is left in the mean of many nights: some of it is the season and not the wind."""
+"""Least part of the wind that is left in the mean of many nights: some of it is the season and not the wind."""
 TOUCHED_SCALES: Array = np.array([[s] * 6 for s in (0.01, 1.0, 4.0, 16.0)] + [[s] * 3 + [0.1] * 3 for s in (4.0, 16.0)])
-"""A mount stays as it is, or somebody touched it: it then moves by `MOVED_RAD` and `MOVED_M` times one of these, or is
-only turned."""
+"""Possible scales of a mount's movement: it stays, or somebody touched it and it moved by `MOVED_RAD` and `MOVED_M`
+times a scale, or only turned."""
 ZOOM_SCALES: Array = np.array([1.0, 4.0, 16.0, 64.0])
-"""Heat moves a focal length by `HEAT_FOCAL` from one view to the next, a zoom ring by so many times more."""
+"""Possible scales of a focal length's change between views: heat, `HEAT_FOCAL`, or a zoom ring."""
 AIMED_ANEW_RAD = 1.0
-"""How an earlier epoch was turned says nothing of how the camera is turned now."""
+"""Prior sigma of a camera's turn since an earlier epoch, which says nothing of its direction now."""
 MOVED = np.array([MOVED_RAD] * 3 + [MOVED_M] * 3)
 FREE = np.array([PRIOR_RAD] * 3 + [PRIOR_M] * 3)
 ONCE: Array = np.ones(1)
-"""The scale of what is known well enough."""
+"""Only scale of an error whose size is known well enough."""
 
 
 @dataclass(frozen=True)
 class Priors:
-    """`mixing` (D, A) and `blocks` of A independent errors; `unknowns` of all views.
+    """Priors of A independent errors: their `mixing` (D, A) into the `unknowns` of all views, and their `blocks`.
 
     `movements` (W,): which of the errors are movements of a camera, and `free` (W,) how far it may have moved if
     nothing is known of it; `changes`: by camera with a memory, see `changes_of`; `lasting` (L,): those of lens and
@@ -82,11 +83,11 @@ class Priors:
     lasting: NDArray[np.intp]
 
     def changes_of(self, camera: str) -> NDArray[np.intp]:
-        """Which of the errors are changes of a camera's focal length since the first nights of its memory."""
+        """Return the errors that are changes of a camera's focal length since the first nights of its memory."""
         return self.changes[camera]
 
     def lens_tonight(self, number: int) -> Array:
-        """Which errors (6, A) make up how far the lens of camera `number` is from the one it is taken to have."""
+        """Return the rows (6, A) of the mixing for the lens parameters of camera `number` tonight."""
         first = POSE_NUMBERS * self.unknowns.views
         rows = np.zeros((len(LENS_NUMBERS), self.mixing.shape[1]))
         tonight = {number, _heat_number(self.unknowns.views, number)}
@@ -104,7 +105,7 @@ def build_priors(
     solved: Unknowns,
     information: Array,
 ) -> Priors:
-    """Return the priors of the cameras of an estimate, found with `solved` unknown, beside where they were `stored`.
+    """Return the priors of the cameras of an estimate, found with `solved` unknown, relative to their `stored` poses.
 
     `unknowns`: those of `unknowns_of`, and `information` (D, D) of the lines on them.
     """
@@ -120,9 +121,9 @@ def build_priors(
 
 
 class _Errors:
-    """Independent errors as they are added: their columns (D,) of `mixing`, and the blocks of groups they are in.
+    """Builder of independent errors: their columns (D,) of `mixing`, and the blocks of their groups.
 
-    `_response` (6 V, E): how least squares changes the poses of all views when numbers of lenses and field change.
+    `_response` (6 V, E): how least squares changes the poses of all views when parameters of lenses and field change.
     """
 
     def __init__(
@@ -150,7 +151,7 @@ class _Errors:
         self._lasting: list[Group] = []
 
     def believed(self) -> Priors:
-        """All of them."""
+        """Return the priors of all errors added."""
         moved = np.concatenate([group.which for group in self._movements])
         free = np.tile(FREE, len(moved) // POSE_NUMBERS)
         lasting = np.concatenate([np.empty(0, dtype=np.intp), *(group.which for group in self._lasting)])
@@ -158,13 +159,13 @@ class _Errors:
         return Priors(self._unknowns, mixing, self._blocks, moved, free, self._changes, lasting)
 
     def add_solved(self, values: Array) -> None:
-        """What the finish has found along with the poses: it stands at `values` (E,) from what was given."""
+        """Add the parameters that the refinement solved for: they stand at `values` (E,) from what was given."""
         first = POSE_NUMBERS * self._unknowns.views
         for at, (parameter, value) in enumerate(zip(self._solved.parameters, values.tolist(), strict=True), first):
             self._blocks.append([self.add_lasting(self._number([at], parameter.expected, ONCE, mean=-value))])
 
     def add_field(self) -> None:
-        """The measures of the field that were not solved for."""
+        """Add the measures of the field that were not solved for."""
         found = {parameter.name for parameter in self._solved.parameters}
         for at, parameter in enumerate(self._unknowns.parameters, POSE_NUMBERS * self._unknowns.views):
             if isinstance(parameter, FieldParameter) and parameter.name not in found:
@@ -172,14 +173,14 @@ class _Errors:
                 self._blocks.append([self.add_lasting(measure)])
 
     def add_camera(self, number: int, before: Camera) -> None:
-        """A camera without a memory: moved or zoomed since it was where it was stored `before`, through its lens."""
+        """Add a camera without a memory: moved or zoomed since it was stored as `before`, through its lens."""
         camera = self._cameras[number]
         self._blocks.append(self._lens(number, lens_numbers(before.intrinsics) - lens_numbers(camera.intrinsics)))
         moved = self._move([number], MOVED, MOVEMENT_SCALES, self._from_stored(number, before))
         self._blocks.append([moved, self._heat([number], FOCAL_SCALES if self._has_fixed_focal(number) else ONCE)])
 
     def add_remembered(self, number: int, memory: CameraMemory) -> None:
-        """A camera with a memory: its mount and lens, and what has happened between the times of its views."""
+        """Add a camera with a memory: its mount and lens, and what has happened between the times of its views."""
         camera = self._cameras[number]
         tonight, anchor, *others = (view for view, owner in enumerate(self._owner_of) if owner == number)
         recent, earlier = (others[:1], others[1:]) if memory.recent else ([], others)
@@ -201,14 +202,14 @@ class _Errors:
         self._blocks.append([self._move([tonight], WIND, ONCE, np.zeros(POSE_NUMBERS))])
 
     def _since(self, views: Sequence[int]) -> Group:
-        """What happened before these views of a camera and holds in all of them: a touch, or a zoom; gives the zoom."""
+        """Add a touch or a zoom before these views of a camera that holds in all of them; return the zoom."""
         touched = self._move(views, MOVED, TOUCHED_SCALES, np.zeros(POSE_NUMBERS))
         zoomed = self._heat(views, ZOOM_SCALES)
         self._blocks.append([touched, zoomed])
         return zoomed
 
     def _move(self, views: Sequence[int], expected: Array, scales: Array, mean: Array) -> Group:
-        """A movement (6,) that some views share."""
+        """Return a new movement (6,) that some views share."""
         columns = np.zeros((self._unknowns.dense, POSE_NUMBERS))
         for view in views:
             columns[self._unknowns.pose(view)] = np.eye(POSE_NUMBERS)
@@ -216,13 +217,13 @@ class _Errors:
         return self._movements[-1]
 
     def _heat(self, views: Sequence[int], scales: Array) -> Group:
-        """A change of the focal length that some views share, of the size of what heat does times the scale."""
+        """Return a new change of the focal length that some views share, of the size of heat times the scale."""
         focal = self._cameras[self._owner_of[views[0]]].intrinsics.focal_length_px
         places = [self._places[_heat_number(self._unknowns.views, view), "focal_length_px"] for view in views]
         return self._number(places, HEAT_FOCAL * focal, scales)
 
     def _lens(self, number: int, mean: Array) -> list[Group]:
-        """The numbers of a lens, of which `mean` (6,) is expected: focal length, aspect and the rest, each a group."""
+        """Return the errors of a lens around `mean` (6,): focal length, aspect and the rest, each a group."""
         known = [
             p
             for p in self._unknowns.parameters
@@ -282,13 +283,13 @@ class _Errors:
         )
 
     def _number(self, places: Sequence[int], expected: float, scales: Array, mean: float = 0.0) -> Group:
-        """An error that changes some numbers alike."""
+        """Return a new error that changes some parameters alike."""
         column = np.zeros((self._unknowns.dense, 1))
         column[list(places)] = 1.0
         return self._group(column, np.array([expected]), np.array([mean]), scales)
 
     def _group(self, columns: Array, expected: Array, mean: Array, scales: Array) -> Group:
-        """A group of errors with these columns (D, n) of the mixing; it is not yet in a block."""
+        """Return a new group of errors with these columns (D, n) of the mixing; it is not yet in a block."""
         which = len(self._columns) + np.arange(columns.shape[1])
         self._columns.extend(columns.T)
         return Group(which, expected, mean, scales)
@@ -300,9 +301,9 @@ def _owners(memories: Sequence[CameraMemory | None]) -> list[int]:
 
 
 def unknowns_of(here: Estimate, memories: Sequence[CameraMemory | None], solved: Unknowns) -> Unknowns:
-    """Return everything that may be off, of all views, found with `solved` unknown.
+    """Return all unknowns of all views that may be off, found with `solved` unknown.
 
-    What heat and zoom rings do to a focal length is a number of each view.
+    Heat and zoom rings change the focal length by a parameter of each view.
     """
     owner_of = _owners(memories)
     views = len(owner_of)
@@ -323,5 +324,5 @@ def unknowns_of(here: Estimate, memories: Sequence[CameraMemory | None], solved:
 
 
 def _heat_number(views: int, view: int) -> int:
-    """The `camera` number of the parameter that is the heat of a view."""
+    """Return the `camera` number of the parameter that is the heat of a view."""
     return views + view

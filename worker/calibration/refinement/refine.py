@@ -1,4 +1,4 @@
-"""The finish: all cameras at once onto the measured lines, by a robust Gauss-Newton, and how sure that is.
+"""Refinement: all cameras at once onto the measured lines, by a robust Gauss-Newton, with uncertainties.
 
 Found with the poses: how the ground swells, and whatever number of lens or field is left free.
 """
@@ -31,35 +31,35 @@ from worker.calibration.refinement.unknowns import Unknowns
 from worker.calibration.robust import huber_weights, tukey_weights
 
 SEARCH_PX = (14.0, 8.0, 5.0)
-"""How far from where the pose expects it a line is looked for, round by round, in pixels of a 4K frame."""
+"""Half width of the search for lines round by round, in pixels of a 4K frame."""
 LAST_SEARCH_PX = 5.0
-"""In the last rounds, which go on until the cameras stand still. Wide enough that it is the robust weights which leave
-out a line point, and not the end of the search, which moves with the cameras."""
+"""Half width of the search in the last rounds, which go on until the cameras stand still. Wide enough that it is the
+robust weights which leave out a line point, and not the end of the search, which moves with the cameras."""
 SPARE_PX = 4.0
-"""So much farther than it is asked to look a reading of a frame reaches, so that it is good for more than one pose, and
+"""Length by which a reading of a frame reaches beyond the search, so that it is good for more than one pose, and
 that of the last round for the evaluation of where it led."""
 EVALUATION_SEARCH_PX = 8.0
 MOST_STEPS = 4
-"""Of a coarse round."""
+"""Most steps of a coarse round."""
 MOST_READINGS, MOST_LAST_STEPS = 6, 12
-"""How often the frames are read again in the last rounds, and how many steps each reading is good for."""
+"""Most readings of the frames in the last rounds, and most steps on each reading."""
 MISFIT_FLATTENS_PX = 0.3
-"""Error that nothing explains at which the ground is taken for half as uneven as its heights say."""
+"""Misfit at which the ground is taken for half as uneven as its heights say."""
 SETTLED_M = 2e-4
-"""Cameras that a step moves less than this are where these measurements lead."""
+"""Move below which a step has converged on these measurements."""
 ARRIVED_M, NEARER, PATIENCE = 5e-5, 0.1, 3
-"""The last steps end when cameras move less than this, or than such a part of the first step on the same reading, or
-when so many steps were no shorter than one before: a line point that fits two shifts alike may go to and fro."""
+"""Ends of the last steps: a move less than this, or than such a part of the first step on the same reading, or so
+many steps no shorter than one before: a line point that fits two shifts alike may go to and fro."""
 READ_ALIKE_M, LEAST_NEARER = 1e-4, 0.2
-"""Cameras that the next reading of the frames would move less than this have arrived. Each moves them by about the same
-part of what the one before did, and by no less than this part of it."""
+"""Move below which the next reading of the frames would leave the cameras where they are. Each reading moves them by
+about the same part of what the one before did, and by no less than `LEAST_NEARER` of it."""
 NOT_LOOKED_AT: NDArray[np.float32] = np.zeros((1, 1), dtype=np.float32)
-"""The response of a network that has not looked at a frame: it sees a marking nowhere."""
+"""Response to a frame that the network was not run on: a marking nowhere."""
 
 
 @dataclass(frozen=True)
 class Observations:
-    """What a finish looks at: per camera the `channels` of its frame and `responses` (H, W), the segmentation 0..1."""
+    """Observations of the cameras: the `channels` of each frame and its `responses` (H, W), the segmentation 0..1."""
 
     channels: Sequence[Channels]
     responses: Sequence[NDArray[np.float32]]
@@ -70,28 +70,28 @@ class Observations:
         return cls(channels, [NOT_LOOKED_AT] * len(channels))
 
     def of(self, numbers: Sequence[int]) -> Observations:
-        """That of some of the cameras."""
+        """Return the observations of some of the cameras."""
         return Observations([self.channels[n] for n in numbers], [self.responses[n] for n in numbers])
 
     def reader(self) -> LineReader:
-        """What measures the lines in it."""
+        """Return a reader of the lines in them."""
         return LineReader(self)
 
 
 class LineReader:
-    """Measures the lines of several cameras around any poses; reads a frame again only where it has to."""
+    """Reader of the lines of several cameras around any poses; it reads a frame again only where it has to."""
 
     def __init__(self, observations: Observations, read: Mapping[int, LineProfiles] = MappingProxyType({})) -> None:
         self._observations = observations
         self._read = dict(read)
 
     def of(self, numbers: Sequence[int]) -> LineReader:
-        """A reader for some of the cameras, with what has been read of them."""
+        """Return a reader for some of the cameras, with what has been read of them."""
         read = {at: self._read[n] for at, n in enumerate(numbers) if n in self._read}
         return LineReader(self._observations.of(numbers), read)
 
     def measure(self, lines: LinePoints, cameras: Sequence[Camera], search_px: float) -> list[Measurements]:
-        """The lines of each camera within `search_px` (of a 4K frame) of where its pose expects them."""
+        """Measure the lines of each camera within `search_px` (of a 4K frame) of where its pose expects them."""
         measured = []
         for number, camera in enumerate(cameras):
             search = search_px * camera.intrinsics.relative_size
@@ -104,7 +104,7 @@ class LineReader:
         return measured
 
     def evidence(self, pitch: Field, lines: LinePoints, cameras: Sequence[Camera]) -> list[Evidence]:
-        """How much of the lines the frames show where the cameras put them."""
+        """Return the evidence for the lines where the cameras put them."""
         return [
             evidence_of(lines, camera, channels, response, left_out(pitch, camera))
             for camera, channels, response in zip(
@@ -156,7 +156,7 @@ def refine(
 
 @dataclass(frozen=True)
 class _Finish:
-    """What moves cameras from where they were `found` onto the lines that a `reader` measures.
+    """Gauss-Newton refinement of cameras `found` near the lines that a `reader` measures.
 
     `anew`: the numbers of the markings that are painted elsewhere and say nothing of any pose.
     """
@@ -167,21 +167,21 @@ class _Finish:
     found: Sequence[Camera]
 
     def measure(self, here: Estimate, search_px: float) -> list[Measurements]:
-        """The lines within `search_px` (of a 4K frame) of where the cameras expect them, on their ground."""
+        """Measure the lines within `search_px` (of a 4K frame) of where the cameras expect them, on their ground."""
         return self.but_anew(self.reader.measure(here.on_ground(self.unknowns), here.cameras, search_px))
 
     def but_anew(self, measured: Sequence[Measurements]) -> list[Measurements]:
-        """The measurements of all markings that are where they were."""
+        """Return the measurements without those of repainted markings."""
         if len(self.anew) == 0:
             return list(measured)
         return [found[~np.isin(found.points.marking, self.anew)] for found in measured]
 
     def around(self, here: Estimate) -> _Finish:
-        """Return the finish for the pitch of an estimate, which steps may have changed."""
+        """Return the refinement for the field of an estimate, which steps may have changed."""
         return replace(self, unknowns=self.unknowns.around(here.pitch, here.lines))
 
     def catch(self, here: Estimate, searches_px: Sequence[float]) -> Estimate:
-        """Where the cameras are when they have caught the lines, round by round with a narrower search."""
+        """Return the estimate after rounds with a narrower and narrower search, which catch the lines."""
         for search in searches_px:
             this = self.around(here)
             measured = this.measure(here, search)
@@ -192,7 +192,7 @@ class _Finish:
         return here
 
     def settle(self, here: Estimate) -> GaussNewtonStep:
-        """The step that leads to where the cameras stand still.
+        """Return the step that leads to where the cameras stand still.
 
         What is read of a frame depends a little on where its pixels lie beside the lines. So the frames are read anew
         at the poses that the last reading led to, until that moves nothing: the end does not depend on the beginning.
@@ -210,7 +210,7 @@ class _Finish:
         return last
 
     def follow(self, here: Estimate) -> GaussNewtonStep:
-        """The last of the steps to where the lines are as the frames have been read."""
+        """Return the last of the steps to the lines as the frames have been read."""
         mixed, lengths = MixedSteps(self.unknowns), list[float]()
         for _ in range(MOST_LAST_STEPS):
             last = self.towards_tukey(here, self.measure(here, LAST_SEARCH_PX))
@@ -223,7 +223,7 @@ class _Finish:
         return last
 
     def down_huber(self, here: Estimate, measured: Sequence[Measurements]) -> Estimate:
-        """Where Huber's loss of the same measurements is least."""
+        """Minimise Huber's loss of the same measurements."""
         for _ in range(MOST_STEPS):
             before = here
             here = gauss_newton_step(here, self.found, doubted(here, measured), self.unknowns, huber_weights).to
@@ -232,7 +232,7 @@ class _Finish:
         return here
 
     def towards_tukey(self, here: Estimate, measured: Sequence[Measurements]) -> GaussNewtonStep:
-        """One step towards the least of Tukey's loss, and how uneven the ground is there."""
+        """Take one step towards the minimum of Tukey's loss, and estimate the ground's unevenness there."""
         measured = doubted(here, measured)
         made = gauss_newton_step(here, self.found, measured, self.unknowns, tukey_weights)
         uneven = made.unevenness(self.unknowns, self.unknowns.ground.even)
@@ -242,13 +242,13 @@ class _Finish:
 
 
 def _aside(remembered: Sequence[CameraMemory | None]) -> NDArray[np.intp]:
-    """The markings that the memory of any camera says are painted elsewhere."""
+    """Return the markings that the memory of any camera says are painted elsewhere."""
     known = [memory.repainted_markings for memory in remembered if memory is not None]
     return np.unique(np.concatenate([np.empty(0), *known])).astype(np.intp)
 
 
 def _painted_anew(here: Estimate, remembered: Sequence[CameraMemory | None], finish: _Finish) -> NDArray[np.intp]:
-    """The markings that lie elsewhere than the memory of any camera has them: they are the same paint for all."""
+    """Return the markings that lie elsewhere than the memory of any camera has them: all see the same paint."""
     if not any(remembered):
         return finish.anew
     measured = finish.reader.measure(here.on_ground(finish.unknowns), here.cameras, SEARCH_PX[0])
@@ -261,10 +261,10 @@ def _painted_anew(here: Estimate, remembered: Sequence[CameraMemory | None], fin
 
 
 def doubted(here: Estimate, measured: Sequence[Measurements]) -> list[Measurements]:
-    """The measurements with the error that neither noise nor paint nor ground explains where the finish stands.
+    """Return the measurements with their misfit: the error that neither noise nor paint nor ground explains.
 
     Lens and field are never quite what they are said to be, by pixels alike near and far. Without it, a far line that a
-    wrong lens puts beside itself by ten of its small sigmas would outweigh all near ones.
+    wrong lens displaces by ten of its small sigmas would outweigh all near ones.
     """
     return [
         replace(found, misfit_px=misfit_px(found.offset(camera, here.lines.position[found.index]), found))
@@ -280,7 +280,7 @@ def evaluate_poses(
     stored: Sequence[Camera] | None = None,
     memories: Sequence[CameraMemory | None] | None = None,
 ) -> RefinedPoses:
-    """What the lines say of poses that are left as they are, with everything else; arguments as for `refine`."""
+    """Evaluate poses that are left as they are, with everything else; arguments as for `refine`."""
     unknowns = Unknowns(len(cameras), free, Ground.under(pitch.line_points()))
     here = Estimate.at(pitch, cameras, unknowns)
     remembered = memories_of_field(memories or [None] * len(cameras), here.lines)
@@ -296,7 +296,7 @@ def _each_alone(
     stored: Sequence[Camera],
     memories: Sequence[CameraMemory | None] | None,
 ) -> RefinedPoses:
-    """Cameras that need not agree, each on a ground of its own."""
+    """Refine cameras that need not agree, each on a ground of its own."""
     ends = [
         refine(pitch, [camera], observations.of([n]), 0.0, stored=[stored[n]], memories=memories and [memories[n]])
         for n, camera in enumerate(cameras)
@@ -324,7 +324,7 @@ def _assessed(
 
 
 def _with_moves(finished: RefinedPoses, here: Estimate, finish: _Finish) -> RefinedPoses:
-    """The same, and of each number of the field that the lines contradict how far it moves the cameras, put right."""
+    """Return the poses, with the move of the cameras for each parameter of the field that the lines contradict."""
     measured = finish.but_anew([one.measured for one in finished.each if one.measured is not None])
     deviations = [
         replace(one, moves_m=_moves_m(one, here, measured, finish)) if one.camera is None and is_sure(one) else one
@@ -354,5 +354,5 @@ def _moves_m(wrong: Deviation, here: Estimate, measured: Sequence[Measurements],
 
 
 def _of_seen(measured: Sequence[Measurements], evidence: Sequence[Evidence]) -> list[Measurements]:
-    """The measurements of markings that are seen: ridges found where a line should be and is not fix no pose."""
+    """Return the measurements of markings that are seen: ridges found where a line should be and is not fix no pose."""
     return [found[np.isin(found.points.marking, seen.seen())] for found, seen in zip(measured, evidence, strict=True)]

@@ -1,9 +1,9 @@
-"""How sure the finish is, and what the lines say of what it takes for known: lenses and field.
+"""Uncertainty of the refinement, and what the lines say of the lenses and the field it takes for known.
 
-Poses are found for the lenses and the field as they are given, because that is how they are used. If those are a
-little off, the poses are off with them, and no residual need show it. So the lines are asked once more, with the
-numbers of every lens and of the field unknown: the poses that are then best are nearer the truth, and how far they are
-from the poses that are answered belongs to their error.
+Poses are found for the lenses and the field as they are given, because that is how they are used. If those are a little
+off, the poses are off with them, and no residual need show it. So the lines are asked once more, with the numbers of
+every lens and of the field unknown: the poses that are then best are nearer the truth, and how far they are from the
+poses that are answered belongs to their error.
 """
 
 from __future__ import annotations
@@ -42,23 +42,23 @@ from worker.calibration.refinement.unknowns import Unknowns
 from worker.calibration.refinement.variance_components import Posterior, posterior
 
 SURE_CHANGE = 3.0
-"""A focal length has changed when it differs by so many times its sigma and what heat does together."""
+"""Sigmas, of estimate and heat together, by which a focal length differs when it has changed."""
 FOCAL = "focal_length_px"
 WORST_MARKINGS = 0.95
-"""Of the line points in view so many are put nearer to their places than the worst: nobody measures at the last one at
-the rim of the picture."""
+"""Quantile of the line points in view that stands for the worst: nobody measures at the last one at the rim of the
+picture."""
 ASKED_MARKINGS = 200
-"""Line points that are asked."""
+"""Number of line points that are evaluated."""
 ASKED_AGAIN = 2
-"""How often lines are weighed again by where everything seems to be by then."""
+"""Number of times that lines are weighed again at the current estimate of everything."""
 
 
 @dataclass(frozen=True)
 class Deviation:
-    """How far a number of a lens (`camera`) or of the field (None) seems to be from what it is taken for.
+    """Estimated error of a parameter of a lens (`camera`) or of the field (None).
 
     `sigma`: of that estimate; `expected`: how far off it is after a good calibration. In the unit that `name` ends on.
-    `moves_m`: of a number of the field, how far each camera's position would move (m) with the field put right, by id.
+    `moves_m`: for a parameter of the field, the move of each camera's position (m) with the field corrected, by id.
     """
 
     camera: str | None
@@ -71,10 +71,10 @@ class Deviation:
 
 @dataclass(frozen=True)
 class ParameterUncertainty:
-    """How well the lines fix a number of lens or field that was solved for.
+    """Uncertainty of a parameter of lens or field that was solved for.
 
     `sigma`: one standard deviation, in the unit that the parameter's name ends on, with what lenses and field may be
-    off; before any line it was the parameter's `expected`. `most_correlated`: which other number correlates most with
+    off; before any line it was the parameter's `expected`. `most_correlated`: the parameter that correlates most with
     it, and their correlation.
     """
 
@@ -91,14 +91,15 @@ class Sigma:
 
     @classmethod
     def from_covariance(cls, covariance: Array) -> Sigma:
-        """From (6, 6) of (rotation rad, position m): root of the summed variances of each three."""
+        """Return the roots of the summed variances of each three of a covariance (6, 6) of (rotation rad, position
+        m)."""
         variances = np.diag(covariance)
         return cls(float(np.degrees(np.sqrt(variances[:3].sum()))), float(np.sqrt(variances[3:].sum())))
 
 
 @dataclass(frozen=True)
 class GroundSigma:
-    """The uncertainty of where markings in view are placed: one standard deviation for each of N line points.
+    """Uncertainty of the places of markings in view: one standard deviation for each of N line points.
 
     `metres` (N,) on the ground, `pixels` (N,) in the picture.
     """
@@ -107,7 +108,7 @@ class GroundSigma:
     pixels: Array
 
     def worst(self, metres: float, pixels: float) -> tuple[float, float, bool]:
-        """Return metres and pixels of the worst marking, and whether they are beyond both of these limits.
+        """Return metres and pixels of the worst marking, and True if they are beyond both of these limits.
 
         Where a pixel covers metres of far grass, no frame tells the place of a marking any better than the pixel.
         """
@@ -118,7 +119,7 @@ class GroundSigma:
 
 @dataclass(frozen=True)
 class PoseAndLens:
-    """Pose and lens of a camera as the lines have both: for whoever measures in the world.
+    """Pose and lens of a camera as the lines have both, for measuring in the world.
 
     `covariance` (12, 12): of the rotation in the camera's frame (rad), the position (m) and `LENS_NUMBERS`.
     """
@@ -128,15 +129,15 @@ class PoseAndLens:
 
     @property
     def sigma(self) -> Sigma:
-        """How sure the pose is."""
+        """Standard deviation of the pose."""
         return Sigma.from_covariance(self.covariance[:POSE_NUMBERS, :POSE_NUMBERS])
 
 
 @dataclass(frozen=True)
 class LensChange:
-    """How much longer a focal length is than in the first nights of a memory: part of it, and its `sigma`.
+    """Relative change of a focal length since the first nights of a memory, and its `sigma`.
 
-    `since`: when those were, None where that is not known.
+    `since`: the time of those, None where that is not known.
     """
 
     since: datetime | None
@@ -145,7 +146,7 @@ class LensChange:
 
     @property
     def notable(self) -> bool:
-        """Whether it is more than heat does to a lens, beyond doubt."""
+        """True if the change is surely more than heat does to a lens."""
         return abs(self.longer) > SURE_CHANGE * float(np.hypot(self.sigma, HEAT_FOCAL))
 
 
@@ -156,19 +157,18 @@ def _not_cross_checked() -> CrossCheck | None:
 
 @dataclass(frozen=True)
 class RefinedPose:
-    """A camera where the refinement ended: its pose for the lens as given, with uncertainty and evidence.
+    """Refined pose of a camera for the lens as given, with uncertainty and evidence.
 
-    `evidence`: how much of the expected lines is seen. None where fewer than `FEWEST_MEASUREMENTS` points were
-    measured: `residual_px`, the rms offset of its lines in px of its own frame; `covariance` (6, 6) of (rotation in the
-    camera's frame rad, position in the world m), with what lens, field and ground may be off; and `repeatability`, the
-    part of sigma that another night's frames would draw anew. `ground_sigma`: how well pose, lens and field together
-    know where markings are, None where none is in view. `zoom`: how much
-    longer than the stored one the focal length is since that pose was stored, None where it was solved for;
-    `with_fitted_zoom`: the camera with that focal length, and the pose that goes with it. `refined`: pose and all of
-    the lens as the lines have them. `lens_change`: of the focal length since the camera's memory began, None without a
-    memory. `cross_checked`: computes the cross-check, lazily, since only the answer that is kept is asked. `measured`:
-    the line measurements; `repainted_markings`: numbers of the markings that lie elsewhere than a memory has them, and
-    were left out; `uneven_m`: standard deviation of the ground's heights.
+    `evidence` for the expected lines. None where fewer than `FEWEST_MEASUREMENTS` points were measured: `residual_px`,
+    the rms offset of its lines in px of its own frame; `covariance` (6, 6) of (rotation in the camera's frame rad,
+    position in the world m), with what lens, field and ground may be off; and `repeatability`, the part of sigma that
+    another night's frames would draw anew. `ground_sigma`: how well pose, lens and field together know where markings
+    are, None where none is in view. `zoom`: the change of the focal length since the pose was stored, None where it was
+    solved for; `with_fitted_zoom`: the camera with that focal length, and the pose that goes with it. `refined`: pose
+    and all of the lens as the lines have them. `lens_change`: of the focal length since the camera's memory began, None
+    without a memory. `cross_checked`: computes the cross-check, lazily, since only the answer that is kept is asked.
+    `measured`: the line measurements; `repainted_markings`: numbers of the markings that lie elsewhere than a memory
+    has them, and were left out; `uneven_m`: standard deviation of the ground's heights.
     """
 
     camera: Camera
@@ -188,26 +188,26 @@ class RefinedPose:
 
     @property
     def lens_changed(self) -> bool:
-        """Whether the focal length has surely changed since the first nights of the camera's memory."""
+        """True if the focal length has surely changed since the first nights of the camera's memory."""
         return self.lens_change is not None and self.lens_change.notable
 
     @property
     def zoom_shift_m(self) -> float:
-        """How far from here the camera is if its lens is what the lines say."""
+        """Distance (m) from the camera's position to its position with the fitted zoom."""
         there = self.camera if self.with_fitted_zoom is None else self.with_fitted_zoom
         return float(np.linalg.norm(there.pose.position - self.camera.pose.position))
 
     @property
     def sigma(self) -> Sigma | None:
-        """How sure the pose is."""
+        """Standard deviation of the pose, None without a covariance."""
         return None if self.covariance is None else Sigma.from_covariance(self.covariance)
 
 
 @dataclass(frozen=True)
 class RefinedPoses:
-    """The cameras on their pitch. `deviations`: what the lines say of lenses and field that were taken for known.
+    """Refined cameras on their field. `deviations`: estimated errors of lenses and field that were taken for known.
 
-    `parameter_uncertainties`: what was left free, in that order.
+    `parameter_uncertainties`: of the free parameters, in their order.
     """
 
     pitch: Field
@@ -217,7 +217,7 @@ class RefinedPoses:
 
     @property
     def cameras(self) -> list[Camera]:
-        """Where they stand."""
+        """Cameras at their refined poses."""
         return [one.camera for one in self.each]
 
 
@@ -229,9 +229,9 @@ def estimate_uncertainty(
     evidence: Sequence[Evidence],
     solved: Unknowns,
 ) -> RefinedPoses:
-    """The answer `here` and what it is worth, found with `solved` unknown.
+    """Return poses with covariances at the solution `here`, found with `solved` unknown.
 
-    `stored`: where the cameras stood when their poses were last known; `memories`: of their earlier nights.
+    `stored`: poses of the cameras when they were last known; `memories`: of their earlier nights.
     """
     memories = [
         memory if memory is not None and len(found) >= FEWEST_MEASUREMENTS else None
@@ -251,17 +251,17 @@ def estimate_uncertainty(
 
 
 def _posterior(believed: Priors, information: MarginalInformation) -> Posterior:
-    """What the independent errors are by what is believed of them and by what the lines say."""
+    """Return the posterior of the independent errors, by their priors and the lines."""
     mixing = believed.mixing
     return posterior(mixing.T @ information.known @ mixing, mixing.T @ information.pull, believed.blocks)
 
 
 @dataclass(frozen=True)
 class _Judgement:
-    """What is known of everything in the end: what was `found` (A,) of the independent errors.
+    """Joint posterior of all unknowns: `found` (A,) of the independent errors.
 
-    `by_lines` (A, A): their covariance if nothing is known of how far cameras moved. `repeated`:
-    see `MarginalInformation`.
+    `by_lines` (A, A): their covariance if nothing is known of how far cameras moved. `repeated`: see
+    `MarginalInformation`.
     """
 
     here: Estimate
@@ -272,7 +272,7 @@ class _Judgement:
 
     @property
     def value(self) -> Array:
-        """The errors (A,)."""
+        """Errors (A,)."""
         return self.found.value
 
     @property
@@ -301,7 +301,7 @@ class _Judgement:
         checks: CrossChecks,
         solved: Unknowns,
     ) -> RefinedPoses:
-        """Everything that is answered."""
+        """Return the refined poses, the deviations, and the uncertainties of free parameters."""
         cameras = self.here.cameras
         each = [
             self._camera(number, memories[number], seen, its, checks, solved)
@@ -356,10 +356,10 @@ class _Judgement:
         return since
 
     def _zoom(self, number: int, solved: Unknowns) -> tuple[Deviation | None, Array]:
-        """Return how much longer a focal length is since it was stored, and the errors (A,) that go with it.
+        """Return the increase of a focal length since it was stored, and the errors (A,) that go with it.
 
         A lens that was wrong when the pose was stored is wrong by as much tonight, and is no zoom; nor is one that was
-        put right since. So it is what has happened since, or all that it is off, whichever is less. None where the
+        corrected since. So it is what has happened since, or all that it is off, whichever is less. None where the
         focal length was solved for.
         """
         off = next((d for d in self._of_lens(number, solved) if d.name == FOCAL), None)
@@ -373,7 +373,7 @@ class _Judgement:
         return replace(off, value=longer_px, sigma=float(np.sqrt(varies @ self.covariance @ varies))), since
 
     def _ground_sigma(self, camera: Camera, both: Array) -> GroundSigma | None:
-        """Return how far off pose and lens, `both` (12, A), and field may put the markings in view.
+        """Return the uncertainty of the markings in view by pose and lens, `both` (12, A), and field.
 
         They may each be off by far more, and make up for each other. What the lines surely contradict is a misfit,
         which residual and diagnosis tell, and no uncertainty. None where no marking is in view.
@@ -405,7 +405,7 @@ class _Judgement:
         return PoseAndLens(moved(with_lens_changed(camera, lens @ self.value), pose @ self.value), covariance)
 
     def _lens_change(self, camera: Camera, memory: CameraMemory) -> LensChange:
-        """Beside what the focal length was in the first nights: what has changed since is an error of its own."""
+        """Return the change of the focal length since the first nights, an error of its own."""
         since = np.zeros(len(self.value))
         since[self.believed.changes_of(camera.id)] = 1.0
         focal = camera.intrinsics.focal_length_px
@@ -413,7 +413,7 @@ class _Judgement:
         return LensChange(memory.since, float(since @ self.value) / focal, sigma)
 
     def _deviations(self, solved: Unknowns) -> list[Deviation]:
-        """What the lines say of lenses and field that were not solved for."""
+        """Return the estimated errors of lenses and field that were not solved for."""
         of_lenses = [one for number in range(len(self.here.cameras)) for one in self._of_lens(number, solved)]
         return [*of_lenses, *self._of_field(solved)]
 
@@ -440,7 +440,7 @@ class _Judgement:
         return told
 
     def _parameter_uncertainty(self, number: int) -> ParameterUncertainty:
-        """What is known of the free parameter that is this number of those that were solved for."""
+        """Return the uncertainty of a free parameter, `number` among the unknowns that were solved for."""
         unknowns = self.believed.unknowns
         first = POSE_NUMBERS * unknowns.views
         at = number - POSE_NUMBERS * len(self.here.cameras)

@@ -1,4 +1,4 @@
-"""What numbers are when nobody knows how far off they may be: the lines choose the scale of their errors.
+"""Variance components: the lines choose the scale of errors that nobody knows.
 
 Numbers are thought to be off by what is expected of them times the scale of their group: one for how far each camera
 moved, one for each focal length, one for the rest of each lens, one for each measure of the field. Scales are those
@@ -23,10 +23,9 @@ SWEEPS = 3
 
 @dataclass(frozen=True)
 class Group:
-    """Numbers whose errors are of one scale: `which` (n,) of those asked for, `expected` (n,) errors at scale 1 around
-    `mean` (n,), and the `scales` (S,), or (S, n) where they differ within the group, that may be theirs. `odds` (S,) of
-    the scales before any line: with them a group has the mean of its variance in place of the likeliest scale.
-    """
+    """Errors of one scale: `which` (n,) of all, `expected` (n,) sizes at scale 1 around `mean` (n,), and the
+    possible `scales` (S,), or (S, n) where they differ within the group. `odds` (S,) of the scales before any line:
+    with them a group has the mean of its variance in place of the likeliest scale."""
 
     which: NDArray[np.intp]
     expected: Array
@@ -35,15 +34,15 @@ class Group:
     odds: Array | None = None
 
     def certainty(self, scale: Array | float) -> Array:
-        """Prior information (n,) on the numbers at one of the scales."""
+        """Return the prior information (n,) on the errors at one of the scales."""
         return np.asarray((self.expected * scale) ** -2)
 
 
 @dataclass(frozen=True)
 class Posterior:
-    """What the numbers (A,) are: their mean `value` and `covariance` (A, A).
+    """Posterior of the errors (A,): their mean `value` and `covariance` (A, A).
 
-    Before any line: their `mean` (A,), and the information `certainty` (A,) on it.
+    Prior: their `mean` (A,), and the information `certainty` (A,) on it.
     """
 
     value: Array
@@ -53,9 +52,9 @@ class Posterior:
 
 
 def posterior(information: Array, pull: Array, blocks: Sequence[Sequence[Group]]) -> Posterior:
-    """What lines say of numbers of unknown scales: those of a block are chosen together, one block after the other.
+    """Return the posterior of errors of unknown scales; the scales of a block are chosen together, block after block.
 
-    `information` (A, A) and `pull` (A,) of the lines: about changes of the numbers from where they stand.
+    `information` (A, A) and `pull` (A,) of the lines: about changes of the errors from where they stand.
     """
     mean = np.zeros(len(pull))
     certainty = np.empty(len(pull))
@@ -82,10 +81,10 @@ def _likeliest(
     block: Sequence[Group],
     which: NDArray[np.intp],
 ) -> Array:
-    """The prior information (n,) on the numbers of a block that makes the lines likeliest, all others as they are.
+    """Return the prior information (n,) on the errors of a block that makes the lines likeliest, all others fixed.
 
-    Groups whose scales have odds are known by the mean of their variance over all scales: lines that tell little of a
-    scale would else choose the least one as surely as lines that tell it.
+    Groups whose scales have odds get the mean of their variance over all scales: lines that tell little of a scale
+    would else choose the least one as surely as lines that tell it.
     """
     rest = np.setdiff1d(np.arange(len(pull)), which)
     of_rest = information[np.ix_(rest, rest)] + np.diag(certainty[rest])
@@ -111,7 +110,7 @@ def _likeliest(
 
 
 def _log_evidence(information: Array, pull: Array, certainty: Array, mean: Array) -> Array:
-    """How likely (T,) the lines are (log, but for a constant) at each prior information (T, n) on the numbers."""
+    """Return the log evidence (T,) of the lines, but for a constant, at each prior information (T, n) on the errors."""
     together = information + certainty[:, :, None] * np.eye(len(pull))
     drawn = pull + certainty * mean
     fit = np.sum(drawn * np.linalg.solve(together, drawn[..., None])[..., 0], axis=1) - certainty @ mean**2
