@@ -1,9 +1,9 @@
-"""How far apart two cameras put the same markings, by the line points that both have measured.
+"""Registration of two cameras by the line points that both have measured.
 
 The same registration as that of two pictures of responses (`registration`), of their line centres seen from above:
-small turns and moves of both cameras that bring the paint of the one onto that of the other. It costs a hundredth,
-and does without the network. Each point is the same piece of line in both views: what is nearer to another line than
-to its own cannot be registered, which is for the responses to do.
+small turns and moves of both cameras that bring the paint of the one onto that of the other. It costs a hundredth, and
+does without the network. Each point is the same piece of line in both views: what is nearer to another line than to its
+own cannot be registered, which is for the responses to do.
 """
 
 from __future__ import annotations
@@ -29,21 +29,21 @@ from worker.calibration.geometry.field import Field
 from worker.calibration.robust import huber_weights
 
 LEASTS = (1.0, 0.3, 0.1, 0.01)
-"""The part of the expected turns and moves that is expected at least, step by step (see `registration.FINE_STAGES`)."""
+"""Least part of the expected turns and moves that is expected, step by step (see `registration.FINE_STAGES`)."""
 ALIKE_M = 2.5
-"""Length of line over which two views are apart alike, by their lenses and by the ground: it counts as one point."""
+"""Length of line over which two views differ alike, by their lenses and by the ground: it counts as one point."""
 
 
 @dataclass(frozen=True)
 class MeasuredLines:
-    """A camera and the line points `measured` in its frame."""
+    """Camera and the line points `measured` in its frame."""
 
     camera: Camera
     measured: Measurements
 
 
 def register_lines(pitch: Field, first: MeasuredLines, second: MeasuredLines) -> Registration | None:
-    """Register the lines of two cameras around the pitch centre, or the markings in common nearest to it.
+    """Register the lines of two cameras around the field's centre, or the markings in common nearest to it.
 
     None where both have measured too little of the same lines to hold the views in the directions that they should.
     """
@@ -79,10 +79,10 @@ def register_lines(pitch: Field, first: MeasuredLines, second: MeasuredLines) ->
 
 
 def _moves(slopes: Array, apart: Array, sigma: Array, spacing_m: float, at_centre: Array) -> tuple[Array, Array]:
-    """The turns and moves (12,) of both cameras that put points as far (M,) m apart as they are, and their covariance.
+    """Return the turns and moves (12,) of both cameras that explain distances `apart` (M,) m, and their covariance.
 
-    `slopes` (M, 12) of that by the moves; `at_centre` (2, 12) of the displacement there. What is expected shrinks with
-    the displacement that is found, and the covariance is that of cameras of which no more is known than is expected.
+    `slopes` (M, 12): Jacobian of those by the moves; `at_centre` (2, 12): of the displacement there. The prior shrinks
+    with the displacement found, and the covariance is that of cameras with the full prior.
     """
     expected = np.linalg.inv(at_centre @ at_centre.T)
     alike = max(ALIKE_M / spacing_m, 1.0)

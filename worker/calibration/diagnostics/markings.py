@@ -1,4 +1,4 @@
-"""What is seen of each marking: how much of it is found, and how far its paint lies from where the venue has it.
+"""Report on each marking: the share of it that is found, and the offset of its paint from where the venue has it.
 
 The pose follows all lines, so one that is elsewhere pulls it along and looks nearer than it is. How far the pose gives
 way is known, and put back. Sigma has what makes the pieces of a line differ, how far the ground under all of it may
@@ -30,36 +30,37 @@ from worker.calibration.robust import tukey_weights
 Direction = Literal["outside", "inside", "right", "left", "far", "near"]
 OPPOSITE: dict[Direction, Direction] = {"outside": "inside", "right": "left", "far": "near"}
 FEWEST_MEASURED = 6
-"""Points of a marking, 25 cm apart, that an offset needs."""
+"""Fewest points of a marking, 25 cm apart, for an offset."""
 HARDLY, FARTHER_PX, MOST = 0.5, 30.0, 0.5
-"""A marking of which less is found is looked for so far around its place, in pixels of a 4K frame; if so much of it is
-seen there, that is it."""
+"""Share found below which a marking is searched for farther away, the width of that search in pixels of a 4K frame,
+and the share that has to be seen there for it to be the marking."""
 MEASURED = ("index", "pixel", "normal", "px_per_metre", "px_per_metre_up", "length_px", "trust")
 LEAST_FREE = 0.1
-"""What must be left of an offset when the pose has given way to it: a line that the pose hangs on has none."""
+"""Least part of an offset that is left when the pose has given way to it: a line that the pose hangs on has none."""
 PUT_BACK_ERROR = 0.3
-"""Of how far the pose gave way: lens and ground do so as well, by how much is known roughly."""
+"""Relative error of how far the pose gave way: lens and ground do so as well, by how much is known roughly."""
 LEAST_AGREEMENT = 0.6
-"""Where a pose finds less of its lines beyond chance, what lies beside them is not their paint."""
+"""Least agreement of a pose for offsets: below it, what lies beside its lines is not their paint."""
 SURE, LEAST_OFF_M = 3.0, 0.03
-"""Of its sigma, and metres: a marking further off than both is elsewhere."""
+"""Limits from which a marking is elsewhere: in its sigmas, and in metres."""
 STRAIGHT = 0.97
 """Length of the mean of the unit normals of a marking from which it is straight."""
 EDGE_M = 0.3
-"""A line that is so near to the outermost one of its direction bounds the field."""
+"""Distance from the outermost line of its direction up to which a line bounds the field."""
 USUAL_COUNTS = 1.0
-"""Patches of line that how patches usually differ counts as, beside those of the marking itself."""
+"""Weight, in patches of line, of how patches usually differ beside those of the marking itself."""
 
 HALF_ARE_NEARER = 0.6745
-"""Than so many sigma, of errors that are normal."""
+"""Median absolute value of normal errors, in sigmas."""
 
 
 @dataclass(frozen=True)
 class MarkingReport:
-    """A marking as one camera sees it: `expected_m` of it in view, and the share 0..1 of that which is `found`.
+    """Report on a marking as one camera sees it: `expected_m` of it in view, and the share 0..1 of that which is
+    `found`.
 
-    `offset_m` ± `sigma_m`: how far its paint lies from where the venue has it, across it on the ground, on the side
-    that `direction` names if positive and on the opposite one if negative. None where that cannot be told.
+    `offset_m` ± `sigma_m`: distance of its paint from where the venue has it, across it on the ground, on the side that
+    `direction` names if positive and on the opposite one if negative. None where that cannot be told.
     """
 
     name: str
@@ -71,14 +72,14 @@ class MarkingReport:
 
     @property
     def is_elsewhere(self) -> bool:
-        """Whether its paint surely is not where the venue has it."""
+        """True if the paint surely is not where the venue has it."""
         if self.offset_m is None or self.sigma_m is None:
             return False
         return abs(self.offset_m) > max(LEAST_OFF_M, SURE * self.sigma_m)
 
     @property
     def side(self) -> Direction | None:
-        """On which side of its place the paint is."""
+        """Side of its place on which the paint is."""
         if self.direction is None or self.offset_m is None or self.offset_m >= 0:
             return self.direction
         return OPPOSITE[self.direction]
@@ -87,7 +88,7 @@ class MarkingReport:
 def report_markings(
     pitch: Field, found: RefinedPose, channels: Channels, response: NDArray[np.float32]
 ) -> list[MarkingReport]:
-    """What a camera sees of each marking of the `pitch` that it should see; dashes and rows are one marking.
+    """Report on each marking of the `pitch` that a camera should see; dashes and rows are one marking.
 
     `channels` of its frame and `response` (H, W), where markings that are not in their places are looked for.
     """
@@ -121,7 +122,8 @@ def _farther_away(
     channels: Channels,
     response: NDArray[np.float32],
 ) -> Measurements | None:
-    """The measurements that the camera was judged by, and of markings that it hardly finds those farther away."""
+    """Return the measurements that the camera was judged by, with those farther away for markings that are hardly
+    found."""
     measured, evidence, camera = found.measured, found.evidence, found.camera
     if measured is None:
         return None
@@ -140,7 +142,7 @@ def _farther_away(
 
 
 def _together(lines: LinePoints, one: Measurements, other: Measurements) -> Measurements:
-    """The measurements of both."""
+    """Return the measurements of both."""
     both = {name: np.concatenate([getattr(one, name), getattr(other, name)]) for name in MEASURED}
     return Measurements(points=lines[both["index"]], misfit_px=one.misfit_px, **both)
 
@@ -148,7 +150,7 @@ def _together(lines: LinePoints, one: Measurements, other: Measurements) -> Meas
 def _offsets(
     lines: LinePoints, group: NDArray[np.intp], found: RefinedPose, seen: Measurements | None
 ) -> dict[int, tuple[float, float]]:
-    """Offset and sigma in metres, along their normals, of those groups of markings of which they can be told.
+    """Return offset and sigma in metres, along their normals, of the groups of markings for which they can be told.
 
     Markings that are elsewhere beyond doubt are let go one after the other, the surest first: what they did to the pose
     says nothing of the others. Where most of the rest is still further off than its sigmas say, no line can be better
@@ -171,7 +173,7 @@ def _offsets(
 
 
 def _told(means: _Means, free: Sequence[int]) -> dict[int, tuple[float, float]]:
-    """Offset and sigma of each group where it and the `free` ones may be elsewhere, and all others are in place."""
+    """Return offset and sigma of each group if it and the `free` ones may be elsewhere, and all others are in place."""
     told = {}
     for row, number in enumerate(means.group):
         rows = [row, *(means.group.index(other) for other in free if other != number)]
@@ -186,7 +188,7 @@ def _told(means: _Means, free: Sequence[int]) -> dict[int, tuple[float, float]]:
 
 
 def direction_of(lines: LinePoints, its: NDArray[np.intp]) -> tuple[Direction, float]:
-    """What to call the side of a marking (its line points) that is positive, and the sign its normals have there.
+    """Return the name of the positive side of a marking (its line points), and the sign its normals have there.
 
     Lines that bound the field and those that bend have an outside; else it is right (x) or far (y).
     """
@@ -203,7 +205,7 @@ def direction_of(lines: LinePoints, its: NDArray[np.intp]) -> tuple[Direction, f
 
 @dataclass(frozen=True)
 class _Means:
-    """Where groups of markings G are: `mean` (G,) m along their normals with its `variance` (G,).
+    """Mean offsets of G groups of markings: `mean` (G,) m along their normals with its `variance` (G,).
 
     `carried` (G, G): how far the pose carries each along when another is one metre elsewhere.
     """
@@ -216,12 +218,12 @@ class _Means:
 
 @dataclass(frozen=True)
 class _Offsets:
-    """Measured points M of one camera: which `group` of markings they are of and which `patch` of line.
+    """Measured points M of one camera: `group` of markings and `patch` of line of each.
 
     `offset` (M,) px along their normals, `scale` (M,) px per metre, `sigma` (M,) px; `slopes` (M, 6) of the offset by
     the pose, and what the pose `gives` (6, M): how it moves for an offset of one sigma there; `alike` (M, C): how far
     they seem to move across their lines, m, by one standard deviation of what moves many of them: parts of the ground
-    and numbers of the lens.
+    and parameters of the lens.
     """
 
     group: NDArray[np.intp]
@@ -237,7 +239,7 @@ class _Offsets:
     def of(
         cls, lines: LinePoints, group: NDArray[np.intp], found: RefinedPose, measured: Measurements
     ) -> _Offsets | None:
-        """None where nothing can be told."""
+        """Return the offsets of measurements, None where too few can be used."""
         camera = found.camera
         here = lines.position[measured.index]
         offset = np.sum((measured.pixel - camera.project(here)) * measured.normal, axis=1)
@@ -262,7 +264,7 @@ class _Offsets:
         return cls(of_group, patch.ravel(), offset, measured.px_per_metre, sigma, slopes, gives, alike)
 
     def means(self) -> _Means:
-        """Where the paint of each group is by what is measured of it."""
+        """Return the mean offset of each group by its measurements."""
         numbers = [n for n in np.unique(self.group).tolist() if np.sum(self.group == n) >= FEWEST_MEASURED]
         usual, mean, variance, says = self._usual(), [], [], []
         for number in numbers:
@@ -283,7 +285,7 @@ class _Offsets:
         return _Means(numbers, np.array(mean), np.array(variance), carried)
 
     def _mean(self, its: NDArray[np.bool_]) -> tuple[float, Array]:
-        """Where the points of a marking are by most of them, m, and how much each of them has a say in it."""
+        """Return the robust mean of the points of a marking, m, and the weight of each of them."""
         metres, sigma_m = self.offset[its] / self.scale[its], self.sigma[its] / self.scale[its]
         mean = float(np.median(metres))
         weight = np.ones(len(metres))
@@ -293,7 +295,7 @@ class _Offsets:
         return mean, weight
 
     def _usual(self) -> float:
-        """By how much more than single points the patches of a marking differ, over all markings of the camera."""
+        """Return how much more than single points the patches of a marking differ, over all markings of the camera."""
         squares, informed, spare = 0.0, 0, 0
         for number in np.unique(self.group):
             its = self.group == number
@@ -309,7 +311,7 @@ class _Offsets:
 
 
 def _rises(ground: Ground, measured: Measurements) -> Array:
-    """How far (M, K), in px along their normals, measured points move when a node of the ground rises by a metre."""
+    """Jacobian (M, K) of measured points along their normals, px, by the heights (m) of the ground's nodes."""
     heights = np.zeros((len(measured), len(ground)))
     row = np.arange(len(measured))[:, None]
     np.add.at(heights, (row, ground.node[measured.index]), ground.share[measured.index])
@@ -317,7 +319,8 @@ def _rises(ground: Ground, measured: Measurements) -> Array:
 
 
 def _by_lens(camera: Camera, points: Array, measured: Measurements) -> Array:
-    """How far (M, 6), in px along their normals, points (M, 3) move for one sigma of each number of the lens."""
+    """Return the moves (M, 6), in px along their normals, of points (M, 3) by one sigma of each parameter of the
+    lens."""
     expected = np.array([number.expected for number in lens_parameters([camera])])
     return np.nan_to_num(-measured.lens_slopes(camera, points) * expected)
 
@@ -325,9 +328,10 @@ def _by_lens(camera: Camera, points: Array, measured: Measurements) -> Array:
 def _given_way(
     ground: Ground, rises: Array, measured: Measurements, slopes: Array, weight: Array, uneven_m: float
 ) -> Array:
-    """How the pose (6, M) moves for an offset of one sigma at each measured point, where the ground gives way as well.
+    """Return the moves of the pose (6, M) for an offset of one sigma at each measured point, where the ground gives way
+    as well.
 
-    `slopes` (M, 6) of the offsets by the pose; `weight` (M,) that the finish gave them.
+    `slopes` (M, 6) of the offsets by the pose; `weight` (M,) that the refinement gave them.
     """
     by_sigma = np.concatenate([slopes, rises], axis=1) / measured.sigma_px[:, None]
     weighted = by_sigma * weight[:, None]
@@ -338,12 +342,12 @@ def _given_way(
 
 
 def _by_patch(patch: NDArray[np.intp], values: Array) -> Array:
-    """Sums of values (M,) by patch."""
+    """Return sums of values (M,) by patch."""
     return np.asarray(np.bincount(np.unique(patch, return_inverse=True)[1], values), dtype=float)
 
 
 def in_words(seen: MarkingReport) -> str:
-    """`far touchline: 62 % found, 10 +- 1 cm outside`, in the letters that OpenCV can draw."""
+    """Return `far touchline: 62 % found, 10 +- 1 cm outside`, in the letters that OpenCV can draw."""
     words = f"{seen.name}: {seen.found:.0%} found"
     if seen.offset_m is None or seen.sigma_m is None:
         return words

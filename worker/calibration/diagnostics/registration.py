@@ -1,4 +1,4 @@
-"""How far apart two cameras put the same markings: the paper's stitch error, measured without ground truth.
+"""Registration of two cameras by their responses: the paper's stitch error, measured without ground truth.
 
 The line responses of both cameras are laid onto the pitch (bird's-eye) and registered: a coarse search that bridges
 metres, then Gauss-Newton, finer and finer, on small turns and moves of both cameras that bring their markings onto each
@@ -72,7 +72,8 @@ EXPECTED_NOISE_M = 0.05
 
 @dataclass(frozen=True)
 class Registration:
-    """The second camera's markings relative to the first's: `dx_px`, `dy_px` along the world's axes, pixels of 10 cm.
+    """Displacement of the second camera's markings relative to the first's: `dx_px`, `dy_px` along the world's axes,
+    pixels of 10 cm.
 
     Where the common markings are all parallel, only the displacement across them. `support`: metres of marking that
     both views show on top of each other once registered. `pair`: the ids of the cameras. Measured `at` a point (2,) of
@@ -88,12 +89,12 @@ class Registration:
 
     @property
     def error_px(self) -> float:
-        """How far apart the two views are."""
+        """Distance between the two views."""
         return float(np.hypot(self.dx_px, self.dy_px))
 
 
 def pairs_in_common(pitch: Field, cameras: Sequence[Camera]) -> list[tuple[Camera, Camera]]:
-    """The pairs of cameras that, by their poses, see enough of the same markings to be compared."""
+    """Return the pairs of cameras that, by their poses, see enough of the same markings to be compared."""
     return [
         (first, second)
         for first, second in combinations(cameras, 2)
@@ -103,7 +104,7 @@ def pairs_in_common(pitch: Field, cameras: Sequence[Camera]) -> list[tuple[Camer
 
 
 def shares_plenty(pitch: Field, first: Camera, second: Camera) -> bool:
-    """Whether two cameras, by their poses, see so many of the same markings that their views have to register."""
+    """True if two cameras, by their poses, see so many of the same markings that their views have to register."""
     centre = reference_point(pitch, first, second)
     return centre is not None and directions_in_common(pitch, first, second, centre) == 2
 
@@ -134,7 +135,8 @@ def register_pair(
 def pair_error_px(
     pitch: Field, registration: Registration, found: tuple[Camera, Camera], others: tuple[Camera, Camera]
 ) -> float:
-    """How far apart, in pixels of 10 cm, two cameras would put the same markings by `others`' poses and lenses.
+    """Return the distance, in pixels of 10 cm, between two cameras' places of the same markings by `others`' poses and
+    lenses.
 
     They were registered as they are `found`: what they see at the registered point is put elsewhere by other poses.
     """
@@ -145,7 +147,7 @@ def pair_error_px(
 
 
 def _put(pitch: Field, camera: Camera, pixel: Array) -> Array:
-    """The point (3,) of the pitch that a camera sees in a pixel (2,)."""
+    """Return the point (3,) of the field that a camera sees in a pixel (2,)."""
     ray = camera.rays(pixel)
     height = np.zeros(())
     # The roof is so flat that a few steps from the height last found reach it.
@@ -156,7 +158,8 @@ def _put(pitch: Field, camera: Camera, pixel: Array) -> Array:
 
 
 def reference_point(pitch: Field, first: Camera, second: Camera) -> Array | None:
-    """The pitch centre (2,) if both cameras see it, else the middle of the common markings around the nearest one."""
+    """Return the field's centre (2,) if both cameras see it, else the middle of the common markings around the
+    nearest one."""
     points = np.concatenate([pitch.lift(np.zeros((1, 2))), pitch.line_points(0.5).position])
     seen = np.all([camera.sees(camera.project(points)) for camera in (first, second)], axis=0)
     if not seen.any():
@@ -169,7 +172,8 @@ def reference_point(pitch: Field, first: Camera, second: Camera) -> Array | None
 
 
 def directions_in_common(pitch: Field, first: Camera, second: Camera, centre: Array) -> int:
-    """In how many directions, 0 to 2, the markings that both cameras should see around a point (2,) can hold a view.
+    """Return the number of directions, 0 to 2, in which the markings that both cameras should see around a point (2,)
+    hold a view.
 
     There must be enough line across a direction, and it must not be so far aside that a turn and a move of a camera
     which cancel there still shift the point: a court whose centre has no circle is held along its centre line by
@@ -191,7 +195,7 @@ def directions_in_common(pitch: Field, first: Camera, second: Camera, centre: Ar
 
 @dataclass(frozen=True)
 class _Fit:
-    """`displacement` (2,) m in the `middle` (2,) in the directions `told` (2, n).
+    """Fit of two views: `displacement` (2,) m in the `middle` (2,) in the directions `told` (2, n).
 
     `support`: metres of marking in common; `correlation`: how alike they are.
     """
@@ -204,12 +208,12 @@ class _Fit:
 
     @property
     def held(self) -> int:
-        """In how many directions the markings hold the views."""
+        """Number of directions in which the markings hold the views."""
         return self.told.shape[1]
 
 
 def _best_fit(pitch: Field, segmented: Sequence[Segmented], centre: Array, held: int) -> _Fit | None:
-    """Where the views should be alike, or, unless they are there, where they look most alike."""
+    """Return the fit where the views should be alike, or, unless they are there, where they look most alike."""
     expected = _fit(pitch, segmented, centre, np.zeros(2), held)
     if expected.correlation > ALIKE and expected.held == held and np.hypot(*expected.displacement) < NEAR_M:
         return expected
@@ -219,7 +223,8 @@ def _best_fit(pitch: Field, segmented: Sequence[Segmented], centre: Array, held:
 
 
 def _guesses(pitch: Field, segmented: Sequence[Segmented], centre: Array) -> list[tuple[Array, Array]]:
-    """Where to measure (2,), and how far apart (2,) the views look there; nothing where that is next to none."""
+    """Return a place to measure (2,) and the views' apparent displacement (2,) there; nothing where that is next to
+    none."""
     grid = _square(centre, COARSE_HALF_M, COARSE_STEP_M)
     views = [ground_view(pitch, camera, response, grid) for camera, response in segmented]
     shift = _coarse_shift(views[0], views[1], pitch.line_width)
@@ -233,7 +238,7 @@ def _guesses(pitch: Field, segmented: Sequence[Segmented], centre: Array) -> lis
 
 
 def _fit(pitch: Field, segmented: Sequence[Segmented], middle: Array, shift: Array, held: int) -> _Fit:
-    """The displacement of the views in the `middle`, from a guess that is right to a metre or so.
+    """Fit the displacement of the views in the `middle`, from a guess that is right to a metre or so.
 
     In at most as many directions as the markings should hold: along a short arc of a circle, which tells a little of
     both, the second is mostly noise.
@@ -262,7 +267,7 @@ def _square(middle: Array, half_m: float, step_m: float) -> Array:
 
 
 def _template(pitch: Field, centre: Array) -> BirdsEye:
-    """The markings as they should be, on the coarse grid."""
+    """Return the markings as they should be, on the coarse grid."""
     points = pitch.line_points(COARSE_STEP_M / 4)
     count = round(COARSE_HALF_M / COARSE_STEP_M)
     edges = COARSE_STEP_M * (np.arange(-count, count + 2) - 0.5)
@@ -273,7 +278,8 @@ def _template(pitch: Field, centre: Array) -> BirdsEye:
 
 
 def _coarse_shift(first: BirdsEye, second: BirdsEye, line_width: float) -> Array | None:
-    """Shift (2,) in metres, world axes, of the second view relative to the first with the highest correlation."""
+    """Return the shift (2,) in metres, world axes, of the second view relative to the first with the highest
+    correlation."""
     a_seen, b_seen = first[1], second[1]
     a, b = (_smooth(view, COARSE_BLUR_M, COARSE_STEP_M, line_width) * view[1] for view in (first, second))
     reach = round(REACH_M / COARSE_STEP_M)
@@ -300,7 +306,7 @@ def _coarse_shift(first: BirdsEye, second: BirdsEye, line_width: float) -> Array
 
 
 def _forms(camera: Camera, points: Array) -> Array:
-    """How points (..., 3) of the pitch move, (..., 2, 6) metres, in the view of a camera that believes a wrong pose.
+    """Jacobian (..., 2, 6) of points (..., 3) of the field in a camera's view, metres per expected error of its pose.
 
     One column per expected turn about each axis of the camera and move along each axis of the world.
     """
@@ -308,12 +314,13 @@ def _forms(camera: Camera, points: Array) -> Array:
 
 
 def forms_of_both(first: Camera, second: Camera, points: Array) -> Array:
-    """How points (..., 3) of the pitch move in the second view relative to the first, (..., 2, 12)."""
+    """Jacobian (..., 2, 12) of points (..., 3) of the field in the second view relative to the first, see `_forms`."""
     return np.concatenate([-_forms(first, points), _forms(second, points)], axis=-1)
 
 
 def _displacement(camera: Camera, points: Array, moves: Array) -> Array:
-    """How points (..., 3) move, (..., 2) metres, by given `moves` (6,): `_forms` times those, without the forms."""
+    """Return the displacement (..., 2) metres of points (..., 3) by `moves` (6,): `_forms` times those, without the
+    forms."""
     change = EXPECTED * moves
     ray = points - camera.pose.position
     carried = change[3:] + np.cross(ray, camera.pose.matrix.T @ change[:3])
@@ -322,7 +329,7 @@ def _displacement(camera: Camera, points: Array, moves: Array) -> Array:
 
 @dataclass(frozen=True)
 class _Fine:
-    """`moves` (12,) of both cameras, in expected turns and moves, and what then coincides.
+    """Moves (12,) of both cameras, in expected turns and moves, and the overlap of the views after them.
 
     `covariance` (12, 12): how loose the markings leave the moves of cameras of which no more is known than is expected.
     """
@@ -336,7 +343,7 @@ class _Fine:
 def _fine_moves(
     first: BirdsEye, second: BirdsEye, forms: Array, at_middle: Array, start: Array, line_width: float
 ) -> _Fine:
-    """Gauss-Newton on the moves (12,) of both cameras.
+    """Fit the moves (12,) of both cameras by Gauss-Newton.
 
     `forms` (n, n, 2, 12): what they do to every `FINEST_STRIDE`th point of each view; `at_middle` (2, 12): what they do
     to the displacement in the middle. The views are sampled where `start` puts them.
@@ -367,7 +374,8 @@ def _fine_moves(
 def _moved(
     views: Sequence[Response], seen: Sequence[Response], forms: Array, moves: Array, stride: int
 ) -> tuple[list[Response], Mask]:
-    """Both views at every `stride`th point after some moves (12,) of their cameras, and where both are seen."""
+    """Return both views at every `stride`th point after some moves (12,) of their cameras, and the mask of points
+    both see."""
     # As plain matrices, which multiply ten times faster.
     offsets = [
         (forms[..., its].reshape(-1, 6) @ moves[its]).reshape(forms.shape[:3]) for its in (slice(6), slice(6, 12))
@@ -380,7 +388,7 @@ def _moved(
 def _normal_equations(
     a: Response, b: Response, valid: Mask, forms: Array, step_m: float, blur: float
 ) -> tuple[Array, Array]:
-    """What the difference of two views says about the moves: pull (12,) and information (12, 12)."""
+    """Return gradient (12,) and information (12, 12) of the moves by the difference of two views."""
     active = valid & (a + b > LEAST_RESPONSE)
     down, right = np.gradient(a + b)
     gradient = np.stack([right[active], -down[active]], axis=-1).astype(float) / (2 * step_m)
@@ -399,7 +407,7 @@ def _normal_equations(
 
 
 def _smooth(view: BirdsEye, blur_m: float, step_m: float, line_width: float) -> Response:
-    """A view blurred over what the camera sees, and no brighter than a line of the width then is.
+    """Return a view blurred over what the camera sees, and no brighter than a line of the width then is.
 
     Lines stay as they are; players and lettering, wider than a line, cannot outweigh them.
     """
@@ -411,7 +419,7 @@ def _smooth(view: BirdsEye, blur_m: float, step_m: float, line_width: float) -> 
 
 
 def _warp(view: Response, offset: Array, stride: int) -> Response:
-    """A view on the fine grid, sampled at every `stride`th point moved by `offset` (n, n, 2) metres."""
+    """Return a view on the fine grid, sampled at every `stride`th point moved by `offset` (n, n, 2) metres."""
     rows, columns = stride * np.indices(offset.shape[:2], np.float32)
     move = (offset / FINE_STEP_M).astype(np.float32)
     sampled = cv2.remap(view, columns + move[..., 0], rows - move[..., 1], cv2.INTER_LINEAR, borderValue=0.0)
@@ -419,7 +427,7 @@ def _warp(view: Response, offset: Array, stride: int) -> Response:
 
 
 def _correlation(a: Response, b: Response) -> float:
-    """Normalised correlation of two sets of values, 0 where there is nothing to correlate."""
+    """Return the normalised correlation of two sets of values, 0 where there is nothing to correlate."""
     if not a.size:
         return 0.0
     a, b = a - a.mean(dtype=float), b - b.mean(dtype=float)

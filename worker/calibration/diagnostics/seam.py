@@ -1,4 +1,4 @@
-"""How far apart two cameras put the same paint, all along what both see: beside the stitch error at the centre a curve.
+"""Seam of two cameras: the distance between their places of the same paint, all along what both see.
 
 It is measured across lines, where both cameras have measured the same piece of one. Along a line nothing tells: each
 place says in which direction it holds.
@@ -21,15 +21,15 @@ PIECE_POINTS = (20, 40, 80, 160)
 MOST_PLACES = 24
 FEWEST_POINTS = 4
 LARGEST_SIGMA_M = 0.2
-"""Where lines are seen less well than this, they do not tell."""
+"""Largest sigma of a line that is compared."""
 
 WELL_KNOWN = 2.0
-"""Times the usual sigma: places that are known less well are not asked for the worst."""
+"""Multiple of the usual sigma up to which a place may be the worst."""
 
 
 @dataclass(frozen=True)
 class SeamPlace:
-    """A piece of line that two cameras have measured around a point `at` (2,) of the pitch.
+    """Piece of line that two cameras have measured around a point `at` (2,) of the field.
 
     The second puts its paint `error_m` ± `sigma_m` beside where the first does, `across` (2,) the line.
     """
@@ -48,14 +48,14 @@ class Seam:
 
     @property
     def worst(self) -> SeamPlace | None:
-        """Where the error is largest, but for places that are measured clearly less well than most."""
+        """Place of the largest error, without places that are measured clearly less well than most."""
         usual = float(np.median([place.sigma_m for place in self.places])) if self.places else 0.0
         known = [place for place in self.places if place.sigma_m <= WELL_KNOWN * usual]
         return max(known, key=lambda place: place.error_m, default=None)
 
 
 def measure_seam(pitch: Field, first: RefinedPose, second: RefinedPose) -> Seam:
-    """The seam of two cameras as they stand; without places where they have measured nothing in common."""
+    """Measure the seam of two cameras as they stand; without places where they have measured nothing in common."""
     if first.measured is None or second.measured is None:
         return Seam([])
     lines = pitch.line_points()
@@ -83,7 +83,7 @@ def measure_seam(pitch: Field, first: RefinedPose, second: RefinedPose) -> Seam:
 
 
 def paint_offsets(lines: LinePoints, camera: Camera, measured: Measurements) -> tuple[Array, Array]:
-    """How far (M,) m along the normals of the lines a camera puts their paint beside them, and the error of that."""
+    """Return the offsets (M,) m, along the lines' normals, of the paint by a camera, and their standard deviations."""
     offset = measured.offset(camera, lines.position[measured.index])
     return offset / measured.px_per_metre, measured.noise_px / measured.px_per_metre
 

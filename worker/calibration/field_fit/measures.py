@@ -1,4 +1,4 @@
-"""The measures of a pitch from the lines that cameras see: length, width, and how its ridge runs.
+"""Fit of a field's length, width and ridge to the lines that cameras see.
 
 Poses, measures and the swells of the ground are found together, as in every calibration. What lines, lenses and ground
 leave open is said as a sigma, and a measure that they leave about as open as it was is not touched.
@@ -25,13 +25,14 @@ from worker.calibration.solve import Problem, judge_each
 from worker.calibration.wide_path import search_and_refine
 
 FIRST_SEARCH_PX = (40.0, 24.0)
-"""A pitch whose measures are guesses has its lines farther from where they are expected than one that is known."""
+"""Half width of the first rounds' search: a field whose measures are guesses has its lines farther from where they
+are expected."""
 TOLD = 0.25
-"""A measure is known when the lines leave this part of what was open, or less."""
+"""Largest part of the prior sigma that the lines leave of a known measure."""
 UNTOUCHED = 0.9
-"""Where they leave this part, no line that it moves was measured."""
+"""Part of the prior sigma from which no line that the measure moves was measured."""
 SURE_DIP = 2.0
-"""A ridge that is lower than the corners by this many sigma is no measurement of a flat pitch."""
+"""Sigmas up to which a ridge lower than the corners is a flat field."""
 QUANTITIES = {
     "length_m": "the pitch's length",
     "width_m": "the pitch's width",
@@ -48,7 +49,7 @@ MeasureName = Literal["length_m", "width_m", "ridge_height_m", "ridge_length_m"]
 
 @dataclass(frozen=True)
 class Measure:
-    """A measure of the pitch, metres: as it was `given` and as the lines have it (`value`), with `sigma`.
+    """Measure of the field, metres: as it was `given` and as the lines have it (`value`), with `sigma`.
 
     `open_m`: a standard deviation of what it might have been before. `known`: whether the lines tell it; if not,
     `value` is worth nothing, the fitted pitch keeps what was given, and `detail` says why.
@@ -65,7 +66,7 @@ class Measure:
 
 @dataclass(frozen=True)
 class FieldFit(EngineResult):
-    """A pitch with the measures that the lines tell, and the cameras as they stand around it."""
+    """Field with the measures that the lines tell, and the cameras around it."""
 
     measures: Sequence[Measure]
 
@@ -111,7 +112,7 @@ def fit_field(
 def fit_measures(
     pitch: Field, cameras: Sequence[Camera], observations: Observations, stitch_weight: float
 ) -> tuple[RefinedPoses, list[Measure]]:
-    """The finish on the pitch with those measures that the lines tell; and what they tell of every measure."""
+    """Refine on the field with those measures that the lines tell; return the poses and every measure."""
     free = free_field(pitch)
     everything = refine(pitch, cameras, observations, stitch_weight, free, (*FIRST_SEARCH_PX, *SEARCH_PX))
     tried = try_ridges(everything, free, observations)
@@ -130,7 +131,7 @@ def fit_measures(
 
 
 def leave_measures(pitch: Field) -> list[Measure]:
-    """The measures as they are, where not all frames can be used to find them."""
+    """Return the measures as they are, where not all frames can be used to find them."""
     given = [(p.name, p.read(pitch), p.expected) for p in free_field(pitch)]
     given.append(("ridge_length_m", pitch.ridge_length, _open_ridge_length(pitch)))
     return [
@@ -173,14 +174,14 @@ def _ridge_length(given: Field, tried: TriedRidges) -> Measure:
 
 
 def _open_ridge_length(pitch: Field) -> float:
-    """One standard deviation of a length between none and that of the whole pitch."""
+    """Return one standard deviation of a length between none and that of the whole field."""
     return float(pitch.length / np.sqrt(12))
 
 
 def _with_known(
     given: Field, fitted: Field, free: Sequence[FieldMeasure], measures: Sequence[Measure], ridge: Measure
 ) -> tuple[Field, list[FieldMeasure]]:
-    """The given pitch with the measures that are known, and which of them are found along with poses."""
+    """Return the given field with the known measures, and those of them that are found along with poses."""
     pitch, still_free = given, []
     for parameter, measure in zip(free, measures, strict=True):
         # What lies below the corners by no more than chance is a flat pitch.
@@ -201,7 +202,7 @@ def _named(parameter: Parameter, cameras: Sequence[Camera]) -> str:
 
 
 def _implausible(pitch: Field) -> str | None:
-    """Why a fitted pitch cannot be one."""
+    """Return why a fitted field cannot be one, None if it can."""
     for what, value in (("length", pitch.length), ("width", pitch.width)):
         extent = pitch.template.size.get(what)
         if extent is not None and not extent.least <= value <= extent.most:

@@ -1,4 +1,4 @@
-"""How long a ridge may be: each length tried, because it moves the lines in kinks that no tangent foretells.
+"""Length of a ridge, by trying each: it moves the lines in kinks that no tangent predicts.
 
 A length is believed by how well the lines fit with it once poses, measures and the swells of the ground are found anew.
 """
@@ -24,14 +24,14 @@ from worker.calibration.robust import TUKEY, robust_scale, tukey_loss, tukey_wei
 
 SPACING_M = 10.0
 STEPS = 4
-"""Per length, for everything that is found with it."""
+"""Gauss-Newton steps per length, for everything that is found with it."""
 ALIKE = 4.0
-"""Lengths whose costs are this near to the least fit alike: two standard deviations."""
+"""Cost above the least up to which lengths fit alike: two standard deviations."""
 
 
 @dataclass(frozen=True)
 class TriedRidge:
-    """A pitch with a ridge of some length, everything else found for it; `cost`: -2 log likelihood, from any zero."""
+    """Field with a ridge of some length, everything else found for it; `cost`: -2 log likelihood, from any zero."""
 
     pitch: Field
     cost: float
@@ -39,25 +39,26 @@ class TriedRidge:
 
 @dataclass(frozen=True)
 class TriedRidges:
-    """`held`: the pitch with the length that it came with; `tried`: every `SPACING_M` from none to the whole pitch."""
+    """Ridges of all lengths. `held`: the field with its own length; `tried`: every `SPACING_M` from none to the
+    whole field."""
 
     held: Field
     tried: Sequence[TriedRidge]
 
     @property
     def lengths(self) -> Array:
-        """Of the ridges tried (T,)."""
+        """Lengths of the ridges tried (T,)."""
         return np.array([ridge.pitch.ridge_length for ridge in self.tried])
 
     @property
     def credence(self) -> Array:
-        """How probable each of the tried lengths is (T,), if all were before."""
+        """Posterior probability of each of the tried lengths (T,), with a flat prior."""
         likelihood = np.exp((self._costs.min() - self._costs) / 2)
         return np.asarray(likelihood / likelihood.sum())
 
     @property
     def best(self) -> float:
-        """The expected length."""
+        """Expected length."""
         return float(self.credence @ self.lengths)
 
     @property
@@ -68,12 +69,12 @@ class TriedRidges:
 
     @property
     def alike(self) -> tuple[float, float]:
-        """The shortest and the longest that fit about as well as the best."""
+        """Shortest and longest ridge that fit about as well as the best."""
         lengths = self.lengths[self._costs < self._costs.min() + ALIKE]
         return float(lengths.min()), float(lengths.max())
 
     def spread(self, read: Callable[[Field], float]) -> float:
-        """How far (rms) another measure is off because the ridge is not as long as it was held."""
+        """Return the rms error of another measure because the ridge is not as long as it was held."""
         off = np.array([read(ridge.pitch) for ridge in self.tried]) - read(self.held)
         return float(np.sqrt(self.credence @ off**2))
 
@@ -83,7 +84,8 @@ class TriedRidges:
 
 
 def try_ridges(base: RefinedPoses, free: Sequence[Parameter], observations: Observations) -> TriedRidges:
-    """Ridges of all lengths on the lines that a finish left; `free`: what is found anew for each, with the poses."""
+    """Try ridges of all lengths on the lines of a refinement; `free`: parameters found anew for each, with the
+    poses."""
     lines = base.pitch.line_points()
     measured = observations.reader().measure(lines, base.cameras, EVALUATION_SEARCH_PX)
     unknowns = Unknowns(len(base.cameras), free, Ground.under(lines))
@@ -105,7 +107,7 @@ def _fitted(
     measured: Sequence[Measurements],
     unknowns: Unknowns,
 ) -> tuple[Estimate, WeightedRows]:
-    """Everything else found for a pitch, and what is left of the lines then."""
+    """Return the estimate of everything else for a field, and the weighted residuals of the lines there."""
     here = Estimate.at(pitch, cameras, unknowns)
     for _ in range(STEPS):
         unknowns = unknowns.around(here.pitch, here.lines)
@@ -114,7 +116,7 @@ def _fitted(
 
 
 def _together(rows: WeightedRows, scale: float) -> float:
-    """As many residuals that neighbours on a line err alike count as one."""
+    """Return the number of residuals that neighbours on a line err alike and that count as one."""
     good = np.abs(rows.value) < TUKEY * scale
     sums = np.bincount(rows.points[rows.at[good]] // CLUSTER_POINTS, rows.value[good])
     return max(float(np.sum(sums**2) / np.sum(rows.value[good] ** 2)), 1.0)

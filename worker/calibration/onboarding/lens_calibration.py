@@ -1,4 +1,4 @@
-"""A lens from photos of a board: Zhang's method by OpenCV, with no more terms than the photos can justify.
+"""Lens from photos of a board: Zhang's method by OpenCV, with no more terms than the photos can justify.
 
 A small residual proves little: with enough terms every set of photos fits. So each lens is judged by photos it was not
 fitted to, the simplest that foretells them as well as the best is taken, and how much the numbers change when photos
@@ -35,15 +35,15 @@ FEWEST_PHOTOS, FEW_PHOTOS = 4, 10
 FOLDS = 5
 ROUNDS = 4
 HURTS, HURTS_PX = 3.0, 1.0
-"""A photo hurts where the others foretell it this many times worse than the median, and at least so badly."""
+"""Limit for a photo that hurts: ratio of its error by the others to the median, and least error in px."""
 MOST_LEFT_OUT = 0.3
 BLURRED, BLURRED_PX = 2.0, 6.0
-"""Edges wider than this many times the median, and at least so wide."""
+"""Width of blurred edges, in multiples of the median, and in px."""
 CELLS = (8, 5)
 """Columns and rows of the picture in which corners are counted."""
 FEW_CELLS = 0.6
 UNSURE = 0.01
-"""Of the focal length, or of the picture's width for the centre: more is not sure enough for a pitch."""
+"""Largest sigma for a field, as a part of the focal length, or of the picture's width for the centre."""
 ZONES = (("top left", "top", "top right"), ("left", "middle", "right"), ("bottom left", "bottom", "bottom right"))
 
 Fate = Literal["used", "no-board", "wrong-size", "hurts"]
@@ -51,7 +51,7 @@ Fate = Literal["used", "no-board", "wrong-size", "hurts"]
 
 @dataclass(frozen=True)
 class Photo:
-    """A photo by its name, its `size` (width, height) and what was seen in it."""
+    """Photo by its name, its `size` (width, height) and the board in it."""
 
     name: str
     size: tuple[int, int]
@@ -60,7 +60,7 @@ class Photo:
 
 @dataclass(frozen=True)
 class PhotoVerdict:
-    """What became of a photo. `rms_px`: how well its corners fit; `left_out_px`: how well the other photos foretell it.
+    """Verdict on a photo. `rms_px`: how well its corners fit; `left_out_px`: how well the other photos predict it.
 
     `blurred`: its edges are wide beside those of the others.
     """
@@ -81,13 +81,13 @@ class Coverage:
 
     @property
     def share(self) -> float:
-        """Of the cells that a corner of the board reached."""
+        """Share of the cells that a corner of the board reached."""
         return float(np.mean(self.cells > 0))
 
 
 @dataclass(frozen=True)
 class LensTrial:
-    """A lens that was tried: its free numbers, and rms residuals of photos fitted and of photos left out."""
+    """Lens model that was tried: its free parameters, and rms residuals of photos fitted and of photos left out."""
 
     terms: tuple[str, ...]
     rms_px: float
@@ -96,11 +96,11 @@ class LensTrial:
 
 @dataclass(frozen=True)
 class LensCalibration:
-    """The lens and what it is worth.
+    """Lens with its uncertainty and the evidence for it.
 
-    `sigma`: one standard deviation per free number, by OpenCV, corners independent; `spread`: the same by leaving out
-    photos (a jackknife over `FOLDS` groups); the `lens` has the larger of both. `corners` and `off` (N, 2): those used,
-    and projected minus seen, px.
+    `sigma`: one standard deviation per free parameter, by OpenCV, corners independent; `spread`: the same by leaving
+    out photos (a jackknife over `FOLDS` groups); the `lens` has the larger of both. `corners` and `off` (N, 2): those
+    used, and projected minus seen, px.
     """
 
     lens: Lens
@@ -118,7 +118,7 @@ class LensCalibration:
 
 
 class UndeterminedLensError(Exception):
-    """The photos cannot fix a lens: says why and what to do."""
+    """Raised when the photos cannot fix a lens: says why and what to do."""
 
 
 def calibrate_lens(
@@ -145,7 +145,7 @@ def calibrate_lens(
 
 
 def _part(report: Callable[[float], None], number: int) -> Callable[[float], None]:
-    """Reports a share 0..1 of one round as one of all."""
+    """Return a reporter that takes the share 0..1 of one round as one of all."""
     return lambda share: report((number + share) / ROUNDS)
 
 
@@ -172,7 +172,7 @@ def _require_enough(used: Mapping[str, BoardDetection], photos: Sequence[Photo])
 
 @dataclass(frozen=True)
 class _Tried:
-    """A rung: its fit to all photos, and what the fits without some of them say of those, and of the numbers.
+    """Fit of a rung to all photos, with the errors and the spread of parameters of the fits without some of them.
 
     `aspect_spread`: of fy/fx, which vary together.
     """
@@ -189,7 +189,7 @@ class _Tried:
 
     @property
     def deviations(self) -> tuple[dict[str, float], dict[str, float]]:
-        """One standard deviation per free number: by the fit, and by leaving out photos."""
+        """Standard deviations of the free parameters: by the fit, and by leaving out photos."""
         lens = self.fit.lens
         return _by_name(self.fit.sigma, self.rung, lens), _by_name(self.spread, self.rung, lens)
 
@@ -203,7 +203,8 @@ class _Chosen:
 def _choose(
     detections: Sequence[BoardDetection], size: tuple[int, int], model: LensModel, report: Callable[[float], None]
 ) -> _Chosen:
-    """The simplest rung that foretells photos as well as the best one, within a standard error of the difference."""
+    """Choose the simplest rung that predicts photos as well as the best one, within a standard error of the
+    difference."""
     tried = []
     for step, rung in enumerate(LADDERS[model]):
         report(step / len(LADDERS[model]))
@@ -221,7 +222,7 @@ def _choose(
 
 
 def _as_good(left_out: Array, best: Array) -> bool:
-    """Whether residuals (photos,) are no larger than the best ones but for a standard error of the difference."""
+    """True if residuals (photos,) are no larger than the best ones but for a standard error of the difference."""
     worse = left_out**2 - best**2
     return bool(worse.mean() <= worse.std(ddof=1) / np.sqrt(len(worse)))
 
@@ -242,7 +243,7 @@ def _try(detections: Sequence[BoardDetection], size: tuple[int, int], model: Len
 
 
 def _jackknife(parts: Array) -> Array:
-    """Standard deviations (K,) of numbers from what they are without each of some groups (groups, K)."""
+    """Return standard deviations (K,) of parameters from their values without each of some groups (groups, K)."""
     return np.sqrt((len(parts) - 1) * np.mean((parts - parts.mean(axis=0)) ** 2, axis=0))
 
 
@@ -250,7 +251,7 @@ def _jackknife(parts: Array) -> Array:
 
 
 def _hurting(names: Sequence[str], left_out_px: Array, most: int) -> dict[str, float]:
-    """The photos, up to `most`, that the others foretell far worse than each other."""
+    """Return the photos, up to `most`, that the others predict far worse than each other."""
     limit = max(HURTS * float(np.median(left_out_px)), HURTS_PX)
     worst = np.argsort(-left_out_px)[: max(most, 0)]
     return {names[i]: float(left_out_px[i]) for i in worst if left_out_px[i] > limit}
@@ -327,7 +328,8 @@ def _by_name(values: Array, rung: Rung, lens: Lens) -> dict[str, float]:
 
 
 def _known_to(chosen: _Chosen) -> dict[str, float]:
-    """One standard deviation per number as a lens names it: the worse of two opinions, both focal lengths apart.
+    """Return one standard deviation per parameter as a lens names it: the worse of two opinions, both focal lengths
+    apart.
 
     A principal point that was left in the middle is known as well as by the simplest lens that has it free.
     """
@@ -349,7 +351,7 @@ def _worse(sigma: Mapping[str, float], spread: Mapping[str, float]) -> dict[str,
 
 
 def measure_coverage(corners: Array, size: tuple[int, int]) -> Coverage:
-    """Where in a picture of `size` (width, height) corners (N, 2) were seen."""
+    """Count the corners (N, 2) over a picture of `size` (width, height)."""
     extent = ((0, size[1]), (0, size[0]))
     cells, _, _ = np.histogram2d(corners[:, 1], corners[:, 0], bins=(CELLS[1], CELLS[0]), range=extent)
     ninths, _, _ = np.histogram2d(corners[:, 1], corners[:, 0], bins=(3, 3), range=extent)

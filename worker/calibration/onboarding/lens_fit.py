@@ -1,4 +1,4 @@
-"""A lens fitted to boards in photos by OpenCV (Zhang's method), with the terms that are left free."""
+"""Lens fit to boards in photos by OpenCV (Zhang's method), with the terms that are left free."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from worker.calibration.onboarding.boards import BoardDetection
 
 @dataclass(frozen=True)
 class Rung:
-    """A lens to try: OpenCV's flags, and the names of the numbers they leave free."""
+    """Lens model to try: OpenCV's flags, and the names of the parameters they leave free."""
 
     terms: tuple[str, ...]
     flags: int
@@ -48,7 +48,8 @@ LADDERS: Mapping[LensModel, Sequence[Rung]] = {
         Rung(("fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4"), _FISHEYE),
     ),
 }
-"""From the simplest to the richest. Sensors have square pixels; a picture stretched by a converter has not."""
+"""Lens models from the simplest to the richest. Sensors have square pixels; a picture stretched by a converter has
+not."""
 NUMBERS: Mapping[LensModel, tuple[str, ...]] = {
     "opencv": ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"),
     "fisheye": ("fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4"),
@@ -57,7 +58,7 @@ NUMBERS: Mapping[LensModel, tuple[str, ...]] = {
 
 @dataclass(frozen=True)
 class LensFit:
-    """OpenCV's answer: the board's place in each photo, `sigma` (K,) in the order of `NUMBERS`, rms `by_photo`."""
+    """Result of OpenCV: the board's place in each photo, `sigma` (K,) in the order of `NUMBERS`, rms `by_photo`."""
 
     lens: Lens
     turns: Sequence[Array]
@@ -67,7 +68,7 @@ class LensFit:
 
 
 def fit_lens(detections: Sequence[BoardDetection], size: tuple[int, int], model: LensModel, rung: Rung) -> LensFit:
-    """The lens with the terms of a rung that fits best. Raises `cv2.error` where the photos cannot carry them."""
+    """Fit the lens with the terms of a rung. Raises `cv2.error` where the photos cannot carry them."""
     world = [s.world.astype(np.float32) for s in detections]
     pixel = [s.pixel.astype(np.float32) for s in detections]
     return (_fit_fisheye if model == "fisheye" else _fit_pinhole)(world, pixel, size, rung)
@@ -108,7 +109,8 @@ def _centred(focal: float, size: tuple[int, int]) -> Array:
 def _fisheye_sigma(
     lens: Lens, turns: Sequence[Array], shifts: Sequence[Array], world: Sequence[Array], rung: Rung, off: Array
 ) -> Array:
-    """What `calibrateCameraExtended` gives for a pinhole: the boards' places taken out of the normal matrix (Schur)."""
+    """Return for a fisheye the deviations that `calibrateCameraExtended` gives for a pinhole: the boards' places are
+    eliminated from the normal matrix (Schur)."""
     names = NUMBERS["fisheye"]
     free = np.array([name in rung.terms for name in names])
     information = np.zeros((int(free.sum()), int(free.sum())))
@@ -126,7 +128,7 @@ def _fisheye_sigma(
 
 
 def predicted_rms_px(lens: Lens, detection: BoardDetection) -> float:
-    """Rms of the corners of a photo by a lens that was not fitted to it; only the board's place is."""
+    """Return the rms of the corners of a photo by a lens that was not fitted to it; only the board's place is."""
     unforetold = float(max(lens.size))
     rays = lens.undistort(detection.pixel)
     known = np.isfinite(rays).all(axis=1)
@@ -140,13 +142,13 @@ def predicted_rms_px(lens: Lens, detection: BoardDetection) -> float:
 
 
 def residuals_px(lens: Lens, turn: Array, shift: Array, world: Array, pixel: Array) -> Array:
-    """Projected minus seen (N, 2) of a board at OpenCV's rvec and tvec."""
+    """Return projected minus seen (N, 2) of a board at OpenCV's rvec and tvec."""
     points = world @ rotation_matrices(turn).T + shift
     return lens.distort(points[:, :2] / points[:, 2:]) - pixel
 
 
 def _floats(values: Any) -> Array:
-    """As NumPy has numbers, whatever OpenCV calls them."""
+    """Return OpenCV's values as a NumPy array of floats."""
     return np.asarray(values, dtype=float)
 
 
@@ -155,11 +157,11 @@ def _vectors(columns: Any) -> list[Array]:
 
 
 def numbers_of(lens: Lens) -> Array:
-    """What a lens has, in the order of `NUMBERS`."""
+    """Return the parameters of a lens, in the order of `NUMBERS`."""
     terms = lens.coefficients[: len(NUMBERS[lens.model]) - 4]
     return np.array([lens.matrix[0, 0], lens.matrix[1, 1], lens.matrix[0, 2], lens.matrix[1, 2], *terms])
 
 
 def rms(values: Array) -> float:
-    """Root of the mean square."""
+    """Return the root of the mean square."""
     return float(np.sqrt(np.mean(np.square(values))))

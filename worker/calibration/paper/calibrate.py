@@ -1,4 +1,4 @@
-"""The paper's method on one page: the same frames and the same judgement, with its own search and without a finish."""
+"""Paper's method on one page: the same frames and the same judgement, with its own search and without a refinement."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ from worker.calibration.solve import PoseSolution, Problem, assess_stored, joine
 
 @dataclass(frozen=True)
 class Preset:
-    """The levels of a search on the ground, and whether it takes the ground for a plane."""
+    """Levels of a search on the ground; `flat`: it takes the ground for a plane."""
 
     levels: Sequence[GroundLevel]
     flat: bool

@@ -1,4 +1,4 @@
-"""How well hypotheses agree with a view, both ways: is the expected seen, and is the seen expected?"""
+"""Agreement of hypotheses with a view, both ways: expected lines that are seen, and seen lines that are expected."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ AT_ONCE = 1024
 NEAREST_M = 0.3
 HALF_WIDTH_PX = WIDTH_PX / 2
 LONGEST_STEP_PX = 25.0
-"""Two points of a marking that are farther apart in the view count as so far, view pixels."""
+"""Longest counted distance between two points of a marking in the view, view pixels."""
 UNSEEN_PX = 40.0
-"""Of line that is taken for missing from every view, so that little in view is not all in view."""
+"""Length of line that is taken for missing from every view, so that little in view is not all in view."""
 FEWEST_POINTS = 30
-"""Points of markings that have to be in view for an agreement to count in full."""
+"""Fewest points of markings in view for an agreement to count in full."""
 ROLLED = 0.01
-"""What a roll of one standard deviation takes from an agreement."""
+"""Agreement that a roll of one standard deviation costs."""
 LOWEST_M = 1.2
-"""Lower no camera is sought: from the ground everything can be explained by a few lines."""
+"""Least height of a sought camera: from the ground everything can be explained by a few lines."""
 
 
 def agreement(field: FieldMap, view: LineView, cameras: Hypotheses, tolerance_px: float) -> Array:
-    """Return for each hypothesis (P,) how much of the lines is found both ways, 0..1, less what its roll costs.
+    """Return the agreement (P,), 0..1, of each hypothesis with the lines of a view, less the cost of its roll.
 
     Dice's coefficient in view pixels: line that is expected and painted, and paint that is expected, out of both; a
     distance of `tolerance_px` counts for 1/e.
@@ -49,7 +49,8 @@ def _agreement(field: FieldMap, view: LineView, cameras: Hypotheses, tolerance: 
 def _expected_and_found(
     field: FieldMap, view: LineView, cameras: Hypotheses, tolerance: float
 ) -> tuple[Array, Array, Array]:
-    """For each hypothesis the length of line in view, how much of it is painted (view pixels), and how many points."""
+    """Return, for each hypothesis, length of line in view, length of it that is painted (view pixels), and number of
+    points."""
     rotations = cameras.rotations.astype(np.float32)
     focal = cameras.focal_px.astype(np.float32)[:, None]
     moved = rotations @ field.points.T - (rotations @ cameras.positions[..., None].astype(np.float32))
@@ -75,7 +76,7 @@ def _expected_and_found(
 
 
 def _explained(field: FieldMap, view: LineView, cameras: Hypotheses, tolerance: float) -> Array:
-    """For each hypothesis the share of the places on paint that lie on a marking, 0..1."""
+    """Return, for each hypothesis, the share of the places on paint that lie on a marking, 0..1."""
     rotations = cameras.rotations.astype(np.float32)
     positions = cameras.positions.astype(np.float32)
     focal = cameras.focal_px.astype(np.float32)[:, None]
@@ -96,7 +97,8 @@ def _explained(field: FieldMap, view: LineView, cameras: Hypotheses, tolerance: 
 
 
 def straightened(places: NDArray[np.float32], bends: Array) -> NDArray[np.float32]:
-    """Places (M, 2) of the view without each of the bends (P,): (P, M, 2), by a Newton step from a first guess."""
+    """Return places (M, 2) of the view with each of the bends (P,) undone: (P, M, 2), by a Newton step from a first
+    guess."""
     if not bends.any():
         return places[None]
     # A place that was `scale` times as far from the centre has scale (1 + bent scale²) = 1.

@@ -1,4 +1,5 @@
-"""Hypotheses moved onto the paint that is seen: Gauss-Newton steps of an iterated closest point, for all at once.
+"""Alignment of hypotheses with the paint that is seen: Gauss-Newton steps of an iterated closest point, for all at
+once.
 
 Each point of a marking is drawn to the nearest paint, across its own line alone: along it nothing is measured. What the
 lines leave open stays as it was, by how far a hypothesis may be off.
@@ -18,10 +19,9 @@ from worker.calibration.relocalisation.line_view import LineView
 
 STEPS = 3
 TURN_RAD, SHIFT = 0.05, 0.06
-"""How far off a hypothesis may be (one standard deviation): turned, and moved by a part of how far it is from what it
-sees."""
+"""Standard deviation of a hypothesis: of its turn, and of its place as a part of the distance to what it sees."""
 NOISE_PX = 2.0
-"""Standard deviation of where one point of paint is measured across its line, view pixels: neighbours share errors."""
+"""Standard deviation of a point of paint measured across its line, view pixels: neighbours share errors."""
 
 
 def aligned(
@@ -41,7 +41,7 @@ def aligned(
 
 
 def _stepped(field: FieldMap, view: LineView, cameras: Hypotheses, tolerance_px: float, lens: LensSteps) -> Hypotheses:
-    """Each hypothesis after one step: of rotation (3), place in its own axes (3), log focal length and bend."""
+    """Return each hypothesis after one step: of rotation (3), place in its own axes (3), log focal length and bend."""
     focal = cameras.focal_px[:, None]
     ahead_of = np.einsum("pij,pnj->pni", cameras.rotations, field.points[None] - cameras.positions[:, None])
     ahead = ahead_of[..., 2] > NEAREST_M

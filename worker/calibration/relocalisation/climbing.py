@@ -1,4 +1,4 @@
-"""An evolution strategy that climbs from many hypotheses to few: narrower tolerances, smaller steps, the best apart."""
+"""Evolution strategy from many hypotheses to few: narrower tolerances, smaller steps, the best ones apart."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from worker.calibration.relocalisation.line_view import LineView
 OFFSPRING = 12
 TURN_RAD = np.array([0.05, 0.05, 0.02])
 STEP = 0.06
-"""Of the distance to the ground that a camera looks at."""
+"""Step of the position, as a part of the distance to the ground that a camera looks at."""
 FARTHEST_M = 120.0
 COOLING = 0.9
 AIMING = 0.3
@@ -73,7 +73,7 @@ def climb(
 
 
 def _mutated(cameras: Hypotheses, scale: float, steps: LensSteps, rng: np.random.Generator) -> Hypotheses:
-    """`OFFSPRING` of each camera: a turn, a step, and changes of focal length and bend, drawn independently."""
+    """Return `OFFSPRING` of each camera: a turn, a step, and changes of focal length and bend, drawn independently."""
     count, half = len(cameras), OFFSPRING // 2
     forward = cameras.rotations[:, 2]
     reach = np.minimum(np.maximum(cameras.positions[:, 2], 1) / np.maximum(-forward[:, 2], 0.05), FARTHEST_M)
@@ -102,7 +102,7 @@ def _mutated(cameras: Hypotheses, scale: float, steps: LensSteps, rng: np.random
 
 
 def _apart(cameras: Hypotheses, scores: Array, level: ClimbingRound) -> NDArray[np.intp]:
-    """The numbers of the best cameras no two of which are alike."""
+    """Return the numbers of the best cameras no two of which are alike."""
     kept = list[int]()
     for n in np.argsort(-scores):
         far = level.scale * (0.2 + 0.03 * float(np.linalg.norm(cameras.positions[n])))

@@ -1,4 +1,4 @@
-"""The crown of a field, found along with the cameras: grass lies on a roof, and a lens bends to make up for it.
+"""Crown of a field, found along with the cameras: grass lies on a roof, and a lens bends to make up for it.
 
 A site that says nothing of its ridge is searched as flat. Where all its cameras are found on that, their lines say
 together how high the ridge is, if there is one.
@@ -20,14 +20,14 @@ from worker.calibration.relocalisation.candidate import Candidate, FrameObservat
 from worker.calibration.relocalisation.sought import SoughtCamera
 
 LOWEST_M, SIGMAS = 0.05, 5.0
-"""A ridge is taken that is so high, and so many of its standard deviations, ..."""
+"""Least height of a ridge to be taken, in metres and in its standard deviations."""
 LESS_LEFT = 0.85
-"""... and with which the lines lie closer than this part of how far they lie from the cameras on a flat field (rms)."""
+"""Largest ratio of the lines' rms distance from the cameras with a ridge to that on a flat field."""
 
 
 @dataclass(frozen=True)
 class CrownedField:
-    """A field with the ridge that was found, and the cameras on it."""
+    """Field with the ridge that was found, and the cameras on it."""
 
     field: Field
     candidates: Sequence[Candidate]
@@ -36,10 +36,11 @@ class CrownedField:
 def find_crown(
     flat: Field, sought: Sequence[SoughtCamera], candidates: Sequence[Candidate], observations: Observations
 ) -> CrownedField | None:
-    """Return the field with the ridge that the lines of all cameras tell, and these on it; None: it may be flat.
+    """Fit the height of a ridge to the lines of all cameras; return the field and cameras with it, None: it may be
+    flat.
 
-    `candidates`: what was found on the `flat` field of each camera that was `sought`; `observations`: what they see. A
-    lens that was given stays.
+    `candidates`: the result on the `flat` field for each camera that was `sought`; `observations`: of the same cameras.
+    A lens that was given stays.
     """
     cameras = [one.camera for one in candidates]
     lenses = [
@@ -60,5 +61,5 @@ def find_crown(
 
 
 def _rms(candidates: Sequence[Candidate]) -> float:
-    """How far lines lie from the cameras, px; NaN where one was not measured."""
+    """Return the rms distance of the lines from the cameras, px; NaN where one was not measured."""
     return float(np.sqrt(np.mean([np.nan if one.residual_px is None else one.residual_px**2 for one in candidates])))

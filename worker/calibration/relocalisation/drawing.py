@@ -1,4 +1,4 @@
-"""Hypotheses drawn at random from where cameras stand beside fields, where too few straight lines are seen."""
+"""Random hypotheses at the usual places of cameras beside fields, where too few straight lines are seen."""
 
 from __future__ import annotations
 
@@ -10,15 +10,16 @@ from worker.calibration.relocalisation.hypotheses import Hypotheses, rotations_o
 
 NEAREST_M, LOWEST_M, HIGHEST_M = 0.5, 2.0, 35.0
 FARTHEST_BESIDE_M, FARTHEST_BEHIND_M = 60.0, 40.0
-"""Beside the long sides, and behind the ends; a field that is larger is looked at from as far as it is large."""
+"""Distance of cameras beside the long sides, and behind the ends; a larger field is filmed from as far as it is
+large."""
 BESIDE, AIMED_AT = 1.3, 1.1
-"""In half sizes of the field: how far along a side cameras stand, and where on the field they look."""
+"""Range of cameras along a side, and of the places they aim at, in half sizes of the field."""
 
 
 def draw(field: FieldMap, focal_px: Array, roll_sigma: float, count: int, rng: np.random.Generator) -> Hypotheses:
-    """Draw so many cameras that look at the field, two thirds of them beside a long side; focal lengths evenly.
+    """Draw cameras that look at the field, two thirds of them beside a long side; focal lengths evenly.
 
-    `roll_sigma`: how far from level they are rolled, rad, one standard deviation.
+    `roll_sigma`: standard deviation of their roll, rad.
     """
     half_x, half_y = field.half_size.tolist()
     behind_an_end = rng.integers(0, 3, count) == 2
@@ -46,7 +47,7 @@ def draw_at(
     count: int,
     rng: np.random.Generator,
 ) -> Hypotheses:
-    """Draw so many cameras within `radius_m` of a place (3,) m that look at the field."""
+    """Draw cameras within `radius_m` of a place (3,) m that look at the field."""
     half_x, half_y = field.half_size.tolist()
     ways = rng.normal(size=(count, 3))
     ways *= (radius_m * np.cbrt(rng.uniform(size=count)) / np.linalg.norm(ways, axis=1))[:, None]

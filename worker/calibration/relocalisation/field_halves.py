@@ -1,4 +1,4 @@
-"""From which side cameras look at a field that is the same from both: by what is said of them, or by each other."""
+"""Side from which cameras look at a symmetric field: by what is said of them, or by each other."""
 
 from __future__ import annotations
 
@@ -13,18 +13,17 @@ from worker.calibration.relocalisation.shared_ground import GroundComparison, Sh
 from worker.calibration.relocalisation.sought import Place
 
 ON_ONE_MOUNT = 0.25
-"""A camera is taken for one on the mount of another when its twin is so much farther away: by one over this part."""
+"""Ratio of distances below which a camera is taken to be on the mount of another rather than its twin."""
 SPEAKS_AGAINST = 0.1
-"""... unless from there the ground correlates by so much more with what another one sees: stands may be alike."""
+"""Correlation by which the ground may speak for the twin without overruling the distance: stands may be alike."""
 BEHIND_AN_END = 0.5
-"""A camera is told by left and right, not by near and far, whose y is less than this part of its x."""
+"""Ratio of y to x of a camera below which it is told by left and right, not by near and far."""
 
 
 @dataclass(frozen=True)
 class ChosenSide:
-    """A camera on the side that it is taken to stand on; `remark`: why, in words; `decided`: whether that is known, or
-    both sides are as good.
-    """
+    """Camera on the side that it is taken to stand on; `remark`: why, in words; `decided`: True unless both sides
+    are as good."""
 
     camera: Camera
     remark: str | None
@@ -34,7 +33,7 @@ class ChosenSide:
 def choose_sides(
     found: Sequence[Camera], places: Mapping[str, Place], known: Sequence[Camera], ground: SharedGround
 ) -> list[ChosenSide]:
-    """Choose of each camera found on a symmetric field itself or its twin.
+    """Choose between each camera found on a symmetric field and its twin.
 
     Cameras with a place are where they may be; the first of all, if no other is `known`, is taken to stand on the near
     side; each other one where the ground looks as one of those sees it. Where that is not clear it stands with one of
@@ -66,7 +65,7 @@ def choose_sides(
 
 
 def side_of(camera: Camera) -> str:
-    """The side of the field that a camera stands on, in a word."""
+    """Return the side of the field that a camera stands on, in a word."""
     x, y, _ = camera.pose.position
     if abs(y) < BEHIND_AN_END * abs(x):
         return "left" if x < 0 else "right"
@@ -85,7 +84,7 @@ def _on_the_near_side(camera: Camera) -> ChosenSide:
 
 
 def _on_shared_ground(camera: Camera, compared: GroundComparison) -> ChosenSide | None:
-    """On the side from which the ground looks as another camera sees it, if that is clear."""
+    """Return the side from which the ground looks as another camera sees it, None if that is not clear."""
     if compared.right is None:
         return None
     taken = (camera, twin(camera))[compared.right]
@@ -95,7 +94,7 @@ def _on_shared_ground(camera: Camera, compared: GroundComparison) -> ChosenSide 
 
 
 def _beside_the_others(camera: Camera, standing: Sequence[Camera], compared: GroundComparison) -> ChosenSide:
-    """On the side on which it stands with another one, if that is clear, and the ground does not look otherwise."""
+    """Return the side on which it stands with another one, if that is clear, and the ground does not look otherwise."""
     sides = (camera, twin(camera))
     metres = [_distance(one, standing) for one in sides]
     nearer = int(np.argmin(metres))
@@ -120,5 +119,5 @@ def _clearness(camera: Camera, standing: Sequence[Camera]) -> float:
 
 
 def _distance(camera: Camera, standing: Sequence[Camera]) -> float:
-    """To the nearest of others, m."""
+    """Return the distance to the nearest of others, m."""
     return min(float(np.linalg.norm(camera.pose.position - other.pose.position)) for other in standing)

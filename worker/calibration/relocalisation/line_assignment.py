@@ -19,22 +19,22 @@ from worker.calibration.relocalisation.line_view import LineView
 from worker.calibration.relocalisation.rotation_voting import Direction
 
 ALONG = 0.012
-"""How far, rad, the plane of a segment may be from a direction that it is taken to run along."""
+"""Largest angle, rad, between the plane of a segment and a direction along which it runs."""
 HIGHEST_M, HEIGHTS = 50.0, 22
 TOGETHER = 0.01
-"""Segments whose measures differ by less than such a part are pieces of one line."""
+"""Relative difference of measures below which segments are pieces of one line."""
 MOST_LINES = 9
 OFF_M, OFF_OF_HEIGHT = 0.1, 0.02
-"""How far a line may be from its marking and still count: so much, and such a part of the height of the camera."""
+"""Distance of a line from its marking at which it counts 1/e: in metres, and as a part of the height of the camera."""
 TRIED_FIRST, TRIED_SECOND = 40, 6
-"""Matches on the first axis that are gone on with, and on the second for each of them."""
+"""Matches on the first axis that are pursued, and on the second for each of them."""
 ALONG_THE_FIELD = 14
-"""Where nothing measures the second axis, so many places along the field are tried."""
+"""Number of places along the field that are tried where nothing measures the second axis."""
 BESIDE = 1.3
 
 
 def positions(field: FieldMap, view: LineView, direction: Direction, most: int) -> Hypotheses:
-    """Return at most so many hypotheses for each way that the field may be turned under the camera."""
+    """Return at most `most` hypotheses for each way that the field may be turned under the camera."""
     found = []
     for turn in range(2 if field.is_symmetric else 4):
         rotation = rotations_of(*(direction.pan_tilt_roll + [turn * np.pi / 2, 0, 0]))
@@ -46,7 +46,7 @@ def positions(field: FieldMap, view: LineView, direction: Direction, most: int) 
 
 
 def _positions(field: FieldMap, view: LineView, rotation: Array, focal: float) -> Array:
-    """Positions (n, 3), the best matched first."""
+    """Return positions (n, 3), the best matched first."""
     normal = view.normals(focal) @ rotation
     along_x = (np.abs(normal[:, 0]) < ALONG) & (np.abs(normal[:, 0]) < np.abs(normal[:, 1]))
     along_y = (np.abs(normal[:, 1]) < ALONG) & ~along_x
@@ -65,7 +65,7 @@ def _positions(field: FieldMap, view: LineView, rotation: Array, focal: float) -
 
 
 def _lines(measures: Array, lengths: Array) -> tuple[Array, Array]:
-    """Measures (n,) of lines and their lengths, out of those of their segments; the longest lines alone."""
+    """Merge the measures and lengths of segments into those (n,) of lines; the longest lines alone."""
     order = np.argsort(measures)
     measures, lengths = measures[order], lengths[order]
     if len(measures) == 0:
@@ -81,7 +81,7 @@ def _lines(measures: Array, lengths: Array) -> tuple[Array, Array]:
 def _matched(
     first: tuple[Array, Array], first_markings: Array, second: tuple[Array, Array], second_markings: Array, half: float
 ) -> list[tuple[float, float, float, float]]:
-    """Height and place on the first axis by matches there, and a place on the second; each with a score."""
+    """Return height and place on the first axis by matches there, and a place on the second; each with a score."""
     scaled = _heights_and_places(first[0], first_markings)
     scores = _score(first, first_markings, *scaled.T)
     found = []
@@ -99,7 +99,8 @@ def _matched(
 
 
 def _heights_and_places(measures: Array, markings: Array) -> Array:
-    """Heights and places (n, 2) that put two lines on two markings, or one line on one marking from a usual height."""
+    """Return heights and places (n, 2) that put two lines on two markings, or one line on one marking from a usual
+    height."""
     markings_of_pairs = _ordered_pairs(markings)
     lines_of_pairs = np.array(list(combinations(measures, 2))).reshape(-1, 2)
     apart = markings_of_pairs[:, 0] - markings_of_pairs[:, 1]
@@ -114,12 +115,12 @@ def _heights_and_places(measures: Array, markings: Array) -> Array:
 
 
 def _ordered_pairs(values: Array) -> Array:
-    """All pairs (n, 2) of two different values, in both orders."""
+    """Return all pairs (n, 2) of two different values, in both orders."""
     return np.array(list(permutations(values, 2))).reshape(-1, 2)
 
 
 def _score(lines: tuple[Array, Array], markings: Array, heights: Array, places: Array) -> Array:
-    """For each height and place (n,) the share of the length of the lines that lies on `markings`, in order (m,)."""
+    """Return, for each height and place (n,), the share of the length of the lines on `markings`, in order (m,)."""
     if len(heights) == 0:
         return np.zeros(0)
     measures, lengths = lines

@@ -1,4 +1,4 @@
-"""What a frame shows of lines, without the distortion of its lens: segments, places on paint, distances to paint."""
+"""Lines of a frame without the distortion of its lens: segments, places on paint, distances to paint."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from worker.calibration.geometry.camera import Array
 from worker.calibration.geometry.lens import Lens
 
 WIDTH_PX = 480
-"""Width of a frame in view pixels: half a pixel of it is what hypotheses are told apart by."""
+"""Width of a frame in view pixels: hypotheses differ by as little as half a pixel of it."""
 WIDEST = 1.3
-"""Undistorted views are cut where they reach farther from the principal point, in widths of a frame."""
+"""Limit of undistorted views from the principal point, in widths of a frame."""
 PAINT = 110
 """Response, 0..255, from which a pixel of the shrunk response is paint."""
 FARTHEST_PX = 60.0
-"""Distances to paint are cut here, view pixels."""
+"""Largest distance to paint, view pixels; longer ones are cut."""
 MOST_SEGMENTS, SHORTEST_SEGMENT_PX = 140, 10.0
 PLACES = 320
-"""So many places on paint are projected to the ground by each pose of a population."""
+"""Number of places on paint that each pose of a population projects to the ground."""
 BORDER_POINTS = 60
-"""On each side of the frame."""
+"""Points on each side of the frame's border."""
 
 
 @dataclass(frozen=True)
@@ -87,11 +87,12 @@ class LineView:
 
     @property
     def lengths(self) -> Array:
-        """The lengths (S,) of the segments, view pixels."""
+        """Lengths (S,) of the segments, view pixels."""
         return np.asarray(np.linalg.norm(self.ends - self.starts, axis=1))
 
     def to_paint(self, places: Array) -> tuple[Array, NDArray[np.bool_]]:
-        """From places (..., 2) to the nearest paint, view pixels; and which of them lie in the frame."""
+        """Return the vectors from places (..., 2) to the nearest paint, view pixels, and True for places in the
+        frame."""
         height, width = self.covered.shape
         at = places - self.corner
         column, row = (
@@ -101,20 +102,20 @@ class LineView:
         return self.nearest[row, column] - at, inside & self.covered[row, column]
 
     def normals(self, focal_px: float) -> Array:
-        """Unit normals (S, 3), in the camera's frame, of the planes through the camera and each segment."""
+        """Return unit normals (S, 3), in the camera's frame, of the planes through the camera and each segment."""
         one = np.ones((len(self.starts), 1))
         normal = np.cross(np.c_[self.starts / focal_px, one], np.c_[self.ends / focal_px, one])
         return np.asarray(normal / np.linalg.norm(normal, axis=1, keepdims=True))
 
 
 def _undistorted(pixels: Array, lens: Lens, focal: float) -> Array:
-    """Pixels (n, 2) of a frame in view pixels; those without a ray are left out."""
+    """Return pixels (n, 2) of a frame in view pixels; those without a ray are left out."""
     plane = lens.undistort(pixels) * focal
     return np.asarray(plane[np.isfinite(plane).all(axis=-1)])
 
 
 def labelled_places(label: NDArray[Any], free: NDArray[np.uint8]) -> NDArray[np.float32]:
-    """Column and row (H, W, 2) of the painted cell, where `free` is 0, whose label each cell has."""
+    """Return column and row (H, W, 2) of the painted cell, where `free` is 0, of each cell's label."""
     row, column = np.nonzero(free == 0)
     of_label = np.zeros((int(label.max()) + 1, 2), np.float32)
     of_label[label[row, column]] = np.stack([column, row], axis=1)
@@ -122,7 +123,7 @@ def labelled_places(label: NDArray[Any], free: NDArray[np.uint8]) -> NDArray[np.
 
 
 def middles_of_paint(small: NDArray[np.uint8]) -> Array:
-    """Pixels (n, 2) of the shrunk response on the middles of what is painted."""
+    """Return pixels (n, 2) of the shrunk response on the middles of what is painted."""
     depth = cv2.distanceTransform((small > PAINT).astype(np.uint8), cv2.DIST_L2, 5)
     middle = (depth > 0) & (depth >= cv2.dilate(depth, np.ones((3, 3), np.uint8)) - 0.25)
     row, column = np.nonzero(middle)
@@ -130,14 +131,14 @@ def middles_of_paint(small: NDArray[np.uint8]) -> Array:
 
 
 def _cells(places: Array, shape: tuple[int, ...]) -> NDArray[np.intp]:
-    """The cells (n, 2), column and row, that places lie in, each once."""
+    """Return the cells (n, 2), column and row, of places, each once."""
     cells = np.rint(places).astype(np.intp)
     within = (cells >= 0).all(axis=1) & (cells < shape[::-1]).all(axis=1)
     return np.unique(cells[within], axis=0)
 
 
 def _segments(small: NDArray[np.uint8], lens: Lens, focal: float, scale: float) -> tuple[Array, Array]:
-    """Starts and ends (S, 2) of the longest straight segments, view pixels (von Gioi et al., LSD, 2012)."""
+    """Return starts and ends (S, 2) of the longest straight segments, view pixels (von Gioi et al., LSD, 2012)."""
     found = cv2.createLineSegmentDetector(cv2.LSD_REFINE_STD).detect(small)[0]
     pixels = (np.zeros((0, 4)) if found is None else found.reshape(-1, 4)) / scale
     starts, ends = (lens.undistort(pixels[:, part]) * focal for part in (slice(0, 2), slice(2, 4)))

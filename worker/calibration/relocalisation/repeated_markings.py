@@ -13,13 +13,13 @@ from worker.calibration.relocalisation.field_map import FieldMap
 from worker.calibration.relocalisation.hypotheses import Hypotheses
 
 ALIKE_M = 0.05
-"""Distances between parallel markings that differ by less are one."""
+"""Difference below which distances between parallel markings are one."""
 LARGEST_SHARE = 0.75
-"""Of the length or width of the field: slides farther than this leave too few of the lines in common."""
+"""Longest slide, as a part of the length or width of the field: longer ones leave too few of the lines in common."""
 
 
 def slid_along_field(field: FieldMap, cameras: Hypotheses) -> Hypotheses:
-    """Each camera moved by every distance between two parallel lines, or between two circles of one size."""
+    """Return each camera moved by every distance between two parallel lines, or between two circles of one size."""
     slides = np.concatenate(
         [
             _slides(field.lines_along_y, np.array([1.0, 0.0, 0.0]), 2 * LARGEST_SHARE * float(field.half_size[0])),
@@ -37,7 +37,7 @@ def slid_along_field(field: FieldMap, cameras: Hypotheses) -> Hypotheses:
 
 
 def _slides(places: Array, axis: Array, longest: float) -> Array:
-    """The distances between any two of the places (n,) of parallel lines as moves (m, 3) along an axis."""
+    """Return the distances between any two of the places (n,) of parallel lines as moves (m, 3) along an axis."""
     apart = np.unique(np.round((places[:, None] - places).ravel() / ALIKE_M)) * ALIKE_M
     apart = apart[(np.abs(apart) > ALIKE_M) & (np.abs(apart) <= longest)]
     return np.asarray(apart[:, None] * axis)

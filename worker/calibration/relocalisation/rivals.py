@@ -50,6 +50,6 @@ def tell_rivals_apart(
 
 
 def _alike(field: Field, markings: FieldMap, candidates: Sequence[Candidate]) -> list[Candidate]:
-    """The best pose, and all others that explain the lines about as well."""
+    """Return the best pose, and all others that explain the lines about as well."""
     best, *others = candidates
     return [best, *rivals(field, markings, best, others)]

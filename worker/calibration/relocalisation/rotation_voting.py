@@ -1,4 +1,4 @@
-"""Rotations, and focal lengths where they are unknown, under which segments run along the field's two directions.
+"""Votes for rotations, and focal lengths where they are unknown: segments run along the field's two directions.
 
 A segment of a line that runs along x of the field lies in a plane, through the camera, that contains x: the normal of
 the plane is perpendicular to it. Long segments vote for rotations whose x or y is perpendicular to their normals. That
@@ -19,36 +19,36 @@ from worker.calibration.relocalisation.sought import SoughtLens
 STEP_DEG = 2.0
 STEEPEST_DEG = 78.0
 ROLL_REACH = 8 / 3
-"""How far rolls are tried, in standard deviations of what is expected."""
+"""Largest roll that is tried, in standard deviations of the expected roll."""
 COARSE, FINE = 0.02, 0.006
-"""How far, rad, a direction may be from the plane of a segment that votes for it: on the grid, and after."""
+"""Angle, rad, between a direction and the plane of a segment at which its vote is 1/e: on the grid, and after."""
 APART_DEG = 4.0
 ROLLED = 0.02
-"""What a roll of one standard deviation takes from the votes."""
+"""Votes that a roll of one standard deviation costs."""
 ROUNDS, OFFSPRING, SPREAD_DEG, NARROWER = 7, 48, 1.4, 0.6
 FOCAL_SPREAD, FOCAL_OFFSPRING = 0.06, 5
 FOCAL_RATIO = 1.19
-"""Between two focal lengths that are tried one after the other."""
+"""Ratio of two focal lengths that are tried one after the other."""
 QUARTER = np.pi / 2
 
 
 @dataclass(frozen=True)
 class Direction:
-    """How a camera may look: pan (rad, up to quarter turns), tilt and roll, its focal length in view px, its votes."""
+    """Hypothesis of a view: pan (rad, up to quarter turns), tilt and roll, its focal length in view px, its votes."""
 
     pan_tilt_roll: Array
     focal_px: float
     votes: float
 
     def is_like(self, other: Direction, apart_deg: float) -> bool:
-        """Whether both differ by less than so much, and by 4 % of focal length."""
+        """True if both differ by less than `apart_deg`, and by 4 % of focal length."""
         if abs(np.log(self.focal_px / other.focal_px)) > 0.04:
             return False
         return bool(_turned(self.pan_tilt_roll, other.pan_tilt_roll) < np.radians(apart_deg))
 
 
 def focal_lengths(view: LineView, sought: SoughtLens) -> Array:
-    """The focal lengths to be tried, view pixels."""
+    """Return the focal lengths to be tried, view pixels."""
     if sought.is_known:
         return np.array([view.focal_px])
     count = max(3, round(np.log(sought.longest_px / sought.shortest_px) / np.log(FOCAL_RATIO)) + 1)
@@ -56,7 +56,7 @@ def focal_lengths(view: LineView, sought: SoughtLens) -> Array:
 
 
 def vote(view: LineView, focal_px: Array, most: int, rng: np.random.Generator) -> list[Direction]:
-    """Return at most so many directions, the most voted for first, each with the focal length that suits it."""
+    """Return at most `most` directions, the most voted for first, each with the focal length that suits it."""
     if len(view.starts) == 0:
         return []
     each = max(5, most // len(focal_px))
@@ -72,7 +72,7 @@ def vote(view: LineView, focal_px: Array, most: int, rng: np.random.Generator) -
 
 
 def _peaks(view: LineView, focal: float, count: int) -> list[Direction]:
-    """The peaks of the votes on a grid."""
+    """Return the peaks of the votes on a grid."""
     step, most_roll = np.radians(STEP_DEG), ROLL_REACH * view.roll_sigma
     axes = np.arange(0, np.pi / 2, step), np.arange(step / 2, np.radians(STEEPEST_DEG), step)
     level = np.stack(np.meshgrid(*axes, [0.0], indexing="ij"), axis=-1).reshape(-1, 3)
@@ -91,7 +91,7 @@ def _peaks(view: LineView, focal: float, count: int) -> list[Direction]:
 
 
 def _climbed(view: LineView, start: Direction, frees_focal: bool, rng: np.random.Generator) -> Direction:
-    """The best direction near a peak, by narrower votes."""
+    """Return the best direction near a peak, by narrower votes."""
     best = Direction(
         start.pan_tilt_roll, start.focal_px, float(_votes(view, start.pan_tilt_roll[None], start.focal_px, FINE)[0])
     )
@@ -110,7 +110,8 @@ def _climbed(view: LineView, start: Direction, frees_focal: bool, rng: np.random
 
 
 def _votes(view: LineView, pan_tilt_roll: Array, focal: float, tolerance: float) -> Array:
-    """For each direction (P, 3) the share of the length of all segments that runs along x or y, less for its roll."""
+    """Return, for each direction (P, 3), the share of the length of all segments that runs along x or y, less for
+    its roll."""
     rotations = rotations_of(*pan_tilt_roll.T).astype(np.float32)
     normals = view.normals(focal).astype(np.float32)
     lengths = view.lengths
@@ -120,6 +121,6 @@ def _votes(view: LineView, pan_tilt_roll: Array, focal: float, tolerance: float)
 
 
 def _turned(one: Array, other: Array) -> float:
-    """The largest of the differences of pan, tilt and roll, rad; a quarter turn of the pan is none."""
+    """Return the largest of the differences of pan, tilt and roll, rad; a quarter turn of the pan is none."""
     pan, tilt, roll = one - other
     return float(max(abs((pan + QUARTER / 2) % QUARTER - QUARTER / 2), abs(tilt), abs(roll)))

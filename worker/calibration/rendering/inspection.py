@@ -1,4 +1,4 @@
-"""Pictures by which a person judges a lens and a first pose: where the evidence is, and how well it fits."""
+"""Pictures by which a person judges a lens and a first pose: the evidence, and how well it fits."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from worker.calibration.rendering.overlays import draw_line, legend, outline
 WIDTH_PX = 1600
 LEGEND_PX = 180
 ARROW_PX = 12.0
-"""As long as this is the arrow of a residual of the median size."""
+"""Length of the arrow for a residual of the median size."""
 PAPER, GRID = (250, 250, 250), (205, 205, 205)
 COVERED, BARE = (205, 235, 205), (215, 215, 250)
 CORNER, ARROW, CENTRE = (150, 90, 30), (40, 40, 220), (200, 0, 200)
@@ -24,7 +24,7 @@ CLICKED, MISLABELLED, EXPECTED = (60, 200, 60), (40, 40, 240), (0, 200, 255)
 
 
 def coverage_picture(found: LensCalibration) -> Frame:
-    """The picture of a camera with every corner that was used, its residual enlarged, and the cells none reached."""
+    """Draw a camera's picture with every corner that was used, its residual enlarged, and the cells none reached."""
     width, height = found.lens.size
     scale = WIDTH_PX / width
     size = (WIDTH_PX, round(height * scale))
@@ -56,7 +56,8 @@ def coverage_picture(found: LensCalibration) -> Frame:
 
 
 def clicks_picture(pitch: Field, clicks: Clicks, found: FirstPose, frame: Frame | None) -> Frame:
-    """The pitch as the first pose has it, over the frame if there is one, and each click with where its label is."""
+    """Draw the field as the first pose has it, over the frame if there is one, and each click with where its label
+    is."""
     width, height = found.camera.intrinsics.size
     picture = np.full((height, width, 3), PAPER, np.uint8) if frame is None else frame.copy()
     thick = max(1, round(width / 1500))
@@ -85,6 +86,7 @@ def _cross(picture: Frame, place: Array, colour: tuple[int, int, int], arm: int)
 
 
 def _fixed(place: Array) -> tuple[int, int]:
-    """Sub-pixel places as OpenCV's drawing takes them, with four bits behind the point; far outside is far enough."""
+    """Return sub-pixel places as OpenCV's drawing takes them, with four bits behind the point; far outside is far
+    enough."""
     x, y = np.rint(np.clip(place, -1e5, 1e5) * 16).astype(int).tolist()
     return x, y

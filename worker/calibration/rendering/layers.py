@@ -29,13 +29,13 @@ DASH_PX, SEAM_PX = 14, 2
 
 
 def stored_layer(pitch: Field, camera: Camera, size: tuple[int, int]) -> Layer:
-    """The centre of each marking by the stored pose; `size`: width, height of the picture it is laid over."""
+    """Draw the centre of each marking by the stored pose; `size`: width, height of the picture it is laid over."""
     lines = [camera.project(pitch.lift(outline(marking)[0])) for marking in pitch.markings()]
     return _of(STORED_COLOUR, _strokes(camera, lines, size, _thickness(STORED_STROKE, size)))
 
 
 def new_layer(pitch: Field, camera: Camera, size: tuple[int, int]) -> Layer:
-    """The edges of each marking by the new pose: the paint stays visible between them."""
+    """Draw the edges of each marking by the new pose: the paint stays visible between them."""
     thickness = _thickness(NEW_STROKE, size)
     gap = EDGE_GAP * thickness * camera.intrinsics.size[0] / size[0]
     lines = [line for marking in pitch.markings() for line in frame_of(pitch, camera, marking, gap)]
@@ -43,7 +43,7 @@ def new_layer(pitch: Field, camera: Camera, size: tuple[int, int]) -> Layer:
 
 
 def mask_layer(response: NDArray[np.uint8], size: tuple[int, int]) -> Layer:
-    """Where the network saw markings; `response` (h, w), of the frame or of an overview: its probability in 0..255."""
+    """Draw the network's response; `response` (h, w), of the frame or of an overview: its probability in 0..255."""
     # Lines are thinner than what is left of them in a smaller picture: the strongest stays, not the mean.
     reach = max(1, round(response.shape[1] / size[0]))
     strongest = cv2.dilate(response, np.ones((reach, reach), np.uint8))
@@ -53,7 +53,7 @@ def mask_layer(response: NDArray[np.uint8], size: tuple[int, int]) -> Layer:
 
 
 def seam_layer(owner: NDArray[np.int8]) -> Layer:
-    """Where one camera hands over to another, dashed; `owner` as in `mosaic.Stitched`."""
+    """Draw, dashed, the lines where one camera hands over to another; `owner` as in `Panorama.owner`."""
     seam = np.zeros(owner.shape, np.uint8)
     for axis in (0, 1):
         one, other = (np.take(owner, range(k, owner.shape[axis] - 1 + k), axis) for k in (0, 1))
@@ -65,12 +65,13 @@ def seam_layer(owner: NDArray[np.int8]) -> Layer:
 
 
 def _thickness(part: float, size: tuple[int, int]) -> int:
-    """A part of a picture's width, in pixels."""
+    """Return a part of a picture's width, in pixels."""
     return max(1, round(part * size[0]))
 
 
 def _strokes(camera: Camera, lines: Sequence[Array], size: tuple[int, int], thickness: int) -> NDArray[np.uint8]:
-    """Coverage (height, width) in 0..255 of lines (n, 2) in a camera's pixels, at the scale of a smaller picture."""
+    """Return the coverage (height, width) in 0..255 of lines (n, 2) in a camera's pixels, at the scale of a smaller
+    picture."""
     coverage = np.zeros((size[1], size[0]), np.uint8)
     scale = np.array(size) / np.array(camera.intrinsics.size)
     for line in lines:

@@ -22,7 +22,8 @@ STRIPE = 64
 
 
 def undistorting(lens: Lens) -> StMap:
-    """Per pixel of the picture without distortion, where to sample the frame: (height, width, 2), see `_st_map`."""
+    """Return, for each pixel of the picture without distortion, where to sample the frame: (height, width, 2), see
+    `_st_map`."""
     inverse = np.linalg.inv(lens.matrix)
 
     def sample(pixels: Array) -> Array:
@@ -32,7 +33,8 @@ def undistorting(lens: Lens) -> StMap:
 
 
 def distorting(lens: Lens) -> StMap:
-    """Per pixel of the frame, where to sample the picture without distortion: (height, width, 2), see `_st_map`."""
+    """Return, for each pixel of the frame, where to sample the picture without distortion: (height, width, 2), see
+    `_st_map`."""
 
     def sample(pixels: Array) -> Array:
         return _linear(lens.matrix, lens.undistort(pixels))
@@ -41,7 +43,8 @@ def distorting(lens: Lens) -> StMap:
 
 
 def _st_map(size: tuple[int, int], sample: Callable[[Array], Array]) -> StMap:
-    """(x + 0.5) / width and (y + 0.5) / height of the pixel to sample: 0..1 from the outer corner at the top left.
+    """Return (x + 0.5) / width and (y + 0.5) / height of the pixel to sample: 0..1 from the outer corner at the top
+    left.
 
     Pixel centres are at integers, as everywhere in the engine.
     """
@@ -55,5 +58,5 @@ def _st_map(size: tuple[int, int], sample: Callable[[Array], Array]) -> StMap:
 
 
 def _linear(matrix: NDArray[np.floating[Any]], points: Array) -> Array:
-    """Points (..., 2) through an upper triangular matrix (3, 3) with last row 0, 0, 1."""
+    """Map points (..., 2) by an upper triangular matrix (3, 3) with last row 0, 0, 1."""
     return points @ matrix[:2, :2].T + matrix[:2, 2]

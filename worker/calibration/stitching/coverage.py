@@ -1,4 +1,4 @@
-"""What of a stitched view no camera sees."""
+"""Part of a stitched view that no camera sees."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Unseen:
 
 
 def unseen_part(seen: NDArray[np.bool_]) -> Unseen:
-    """What of a view is unseen, by where it is `seen` (H, W)."""
+    """Return the unseen part of a view, by where it is `seen` (H, W)."""
     counts = {
         name: np.count_nonzero(~cell)
         for names, band in zip(NINTHS, np.array_split(seen, 3), strict=True)

@@ -20,17 +20,19 @@ from worker.calibration.stitching.photometry import Light
 from worker.calibration.stitching.views import StitchedView
 
 MOTION_COLUMNS = 320
-"""The motion is computed at about so many places across the view; the tests hold it below 0.05 px for a degree."""
+"""Approximate number of places across the view at which the motion is computed; the tests hold its error below 0.05
+px for a degree."""
 STILL_BORDER = 0.02
-"""Of the width of a frame: what lies nearer to its border comes and goes with the shaking, and is not shown."""
+"""Margin of a frame, in its widths, that is not shown, as it comes and goes with the shaking."""
 VIEW_BORDER = 0.025
-"""Of the width of a frame: a view that ends so far inside has no holes, also where stored poses are a little off."""
+"""Margin, in widths of a frame, inside which a view ends without holes, also where stored poses are a little off."""
 FILLED = 3
-"""So many rounds carry motion to places that the lens model does not cover, for the pixels beside them."""
+"""Number of rounds that carry motion to places that the lens model does not cover, for the pixels beside them."""
 
 
 class MovingPanorama:
-    """The view and its parts where `cameras` are the references of a clip; `at` is the panorama of other moments."""
+    """Panorama of a view whose parts lie where `cameras` are the references of a clip; `at` is that of other
+    moments."""
 
     def __init__(
         self, pitch: Field, view: StitchedView, cameras: Sequence[Camera], lights: Mapping[str, Light] | None = None
@@ -43,7 +45,7 @@ class MovingPanorama:
         self._used = [_used(part, self._step) for part in self._still.parts]
 
     def at(self, cameras: Sequence[Camera]) -> Panorama:
-        """The panorama where the same cameras, in the same order, are elsewhere by a degree or two."""
+        """Return the panorama where the same cameras, in the same order, have moved by a degree or two."""
         motions = [
             _filled((camera.project(self._points) - before).astype(np.float32))
             for before, camera in zip(self._before, cameras, strict=True)
@@ -62,7 +64,7 @@ class MovingPanorama:
 
 
 def _within_frames(parts: Sequence[Contribution], seen: NDArray[np.bool_], margin: float) -> list[Contribution]:
-    """The parts without what lies outside of their frames, or nearer to the border than `margin` (of the width).
+    """Return the parts without what lies outside of their frames, or nearer to the border than `margin` (of the width).
 
     Weights sum to 1 again where it was `seen` (H, W) before, wherever a camera is left that sees it.
     """
@@ -76,7 +78,7 @@ def _within_frames(parts: Sequence[Contribution], seen: NDArray[np.bool_], margi
 
 
 def _used(part: Contribution, step: int) -> NDArray[np.bool_]:
-    """Which of `every_nth_pixel` (h, w) have to do with pixels where a camera counts."""
+    """True for those of `every_nth_pixel` (h, w) that have to do with pixels where a camera counts."""
     reach = cv2.dilate((part.weight > 0).astype(np.uint8), np.ones((2 * step + 1, 2 * step + 1), np.uint8))
     height, width = part.weight.shape
     column, row = (
@@ -87,7 +89,7 @@ def _used(part: Contribution, step: int) -> NDArray[np.bool_]:
 
 
 def _filled(motion: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Motion (h, w, 2) with means of the neighbours where it is NaN, and none farther off."""
+    """Return motion (h, w, 2) with means of the neighbours where it is NaN, and none farther off."""
     known = np.asarray(np.isfinite(motion).all(axis=-1))
     for _ in range(FILLED):
         if known.all():

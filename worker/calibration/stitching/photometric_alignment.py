@@ -1,4 +1,4 @@
-"""What makes cameras agree in a stitched view, from what they show of the same places, and where its seams are best."""
+"""Photometric alignment of cameras in a stitched view by the places that several of them show, and its best seams."""
 
 from __future__ import annotations
 
@@ -44,7 +44,8 @@ REACH_SIGMA, SEAM_SIGMA = 1.0, 0.2
 
 
 def evened_out(pitch: Field, cameras: Sequence[Camera], frames: Mapping[str, Frame]) -> dict[str, Light]:
-    """What makes the cameras agree where they overlap, by camera; none of one that overlaps no other.
+    """Return the corrections that make the cameras agree where they overlap, by camera; none for one that overlaps no
+    other.
 
     Least squares of the logarithms of what two cameras show of the same places, robust to players and to whatever
     stands off the ground; held near no correction at all, so that only differences follow the pictures. The seams then
@@ -70,9 +71,8 @@ def evened_out(pitch: Field, cameras: Sequence[Camera], frames: Mapping[str, Fra
 
 @dataclass(frozen=True)
 class _Seen:
-    """What a camera shows of places (H, W): logarithms (H, W, 3), where it does, squared distances from the middle of
-    its frame, and how well it sees there.
-    """
+    """Picture of places (H, W) by a camera: logarithms (H, W, 3), mask of valid ones, squared distances from the
+    middle of its frame, and how well it sees there."""
 
     logs: NDArray[np.float32]
     valid: NDArray[np.bool_]
@@ -80,7 +80,7 @@ class _Seen:
     quality: NDArray[np.float32]
 
     def evened(self, numbers: Array) -> Array:
-        """The logarithms with log gains, contrast and falloff (5,) applied."""
+        """Return the logarithms with log gains, contrast and falloff (5,) applied."""
         changed = self.logs + numbers[:3] + numbers[3] * (self.logs - math.log(MIDDLE))
         return np.asarray(changed + numbers[4] * self.radius[..., None], float)
 
@@ -105,7 +105,7 @@ def _seen(camera: Camera, frame: Frame, points: Array) -> _Seen:
 
 @dataclass(frozen=True)
 class _Overlap:
-    """What two cameras say of each other: `design` (n, 10) times the numbers of both should be `difference` (n,).
+    """Equations of two cameras: `design` (n, 10) times the parameters of both should be `difference` (n,).
 
     A row for each colour of each place; log gains of blue, green and red, contrast and falloff of either.
     """
@@ -116,7 +116,7 @@ class _Overlap:
 
     @classmethod
     def of(cls, i: int, j: int, seen: Sequence[_Seen]) -> _Overlap:
-        """Of cameras number i and j."""
+        """Return the equations of cameras number i and j."""
         both = seen[i].valid & seen[j].valid
         design = np.zeros((np.count_nonzero(both), 3, 2, UNKNOWNS))
         for side, (camera, sign) in enumerate(((i, 1), (j, -1))):
@@ -129,12 +129,12 @@ class _Overlap:
 
     @property
     def columns(self) -> NDArray[np.intp]:
-        """Where its unknowns are among those of all cameras."""
+        """Indices of its unknowns among those of all cameras."""
         return np.concatenate([UNKNOWNS * n + np.arange(UNKNOWNS) for n in self.cameras])
 
 
 def _solved(overlaps: Sequence[_Overlap], count: int) -> Array:
-    """Log gains of blue, green and red, contrast and falloff of each camera, (count, 5)."""
+    """Return log gains of blue, green and red, contrast and falloff of each camera, (count, 5)."""
     sigma = np.tile([*3 * [GAIN_SIGMA], CONTRAST_SIGMA, FALLOFF_SIGMA], count)
     solution: Array = np.zeros(UNKNOWNS * count)
     for _ in range(ROUNDS):
@@ -152,7 +152,7 @@ def _solved(overlaps: Sequence[_Overlap], count: int) -> Array:
 
 
 def _reaches(overlaps: Sequence[_Overlap], seen: Sequence[_Seen], numbers: Array) -> Array:
-    """The reach of each camera that brings the seam of each pair to where the two differ least."""
+    """Return the reach of each camera that brings the seam of each pair to where the two differ least."""
     normal, right = np.eye(len(seen)) / REACH_SIGMA**2, np.zeros(len(seen))
     for overlap in overlaps:
         i, j = overlap.cameras
@@ -164,7 +164,7 @@ def _reaches(overlaps: Sequence[_Overlap], seen: Sequence[_Seen], numbers: Array
 
 
 def _best_seam(first: _Seen, second: _Seen, by_first: Array, by_second: Array) -> float:
-    """The log ratio of how well two cameras see along which their evened pictures differ least."""
+    """Return the log ratio of how well two cameras see along which their evened pictures differ least."""
     both = first.valid & second.valid
     ratio = np.log(first.quality[both] / second.quality[both])
     apart = np.abs(first.evened(by_first) - second.evened(by_second)).mean(axis=-1)[both]

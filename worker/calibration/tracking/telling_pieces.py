@@ -1,4 +1,4 @@
-"""Which few of many pieces of line say most of a camera's pose: near and far, all over the picture."""
+"""Choice of the few pieces of line that tell most about a camera's pose: near and far, all over the picture."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from worker.calibration.geometry.camera import Array
 
 
 def most_telling(slopes: Array, patch: NDArray[np.intp], prior: Array, count: int) -> NDArray[np.intp]:
-    """Indices, rising, of up to `count` of N pieces that together leave least open of a pose (D-optimal, greedily).
+    """Return indices, rising, of up to `count` of N pieces that together leave least open of a pose (D-optimal,
+    greedily).
 
     `slopes` (N, 6): how far each moves, in its own standard deviation, per unit of the pose; `patch` (N,): pieces of
     one err together, so each further one of a patch counts for less; `prior` (6, 6): information without any piece.
