@@ -75,7 +75,7 @@ def draw_colours(frame: Frame, colours: Array, chosen: Sequence[int]) -> Frame:
         size = np.linalg.norm(difference, axis=-1, keepdims=True)
         angle = np.arccos(np.clip(along / np.maximum(size, 1e-6), -1.0, 1.0))
         likelihood = np.exp(-0.5 * (angle / SPREAD_RAD) ** 2)
-        # What is of none of the colours is of none of them, and not of the nearest.
+        # A colour unlike all of them belongs to none, and not to the nearest.
         belongs = likelihood / np.maximum(likelihood.sum(axis=-1, keepdims=True), np.exp(-0.5 * 2.0**2))
         share = np.clip(along / sizes.astype(np.float32), 0.0, 1.0)
         shown = (belongs * share)[..., list(chosen)].sum(axis=-1)

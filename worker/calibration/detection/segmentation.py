@@ -4,7 +4,7 @@ The network sees the frame as the camera took it. Undistorting first would stret
 as many pixels and blur what it stretches; the lens model is in the projection instead.
 
 It sees frames of more than about 2.5K shrunk to half: a quarter of the work, and on a real pair of 3072 x 1728 pixels
-the same poses to 0.01 px on clicked points. What the last pixel knows, the finish reads from the frame itself.
+the same poses to 0.01 px on clicked points. The refinement reads the frame itself.
 """
 
 from __future__ import annotations

@@ -185,7 +185,7 @@ def _cause(
     """Return the likeliest cause, and the cells it took; the surest causes first."""
     enough = LEAST_SPOILED * field.sum()
     lit = field & ~spoiled["dark"] & (cells.brightest > DIM)
-    # What is black beside a field that is lit is an object, or a shadow.
+    # Black beside a field that is lit is an object, or a shadow.
     if spoiled["dark"].sum() >= enough and lit.sum() < FEWEST_CELLS:
         return "dark", spoiled["dark"]
     pale = spoiled["veiled"] | spoiled["white"]

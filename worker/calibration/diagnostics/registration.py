@@ -31,7 +31,7 @@ Segmented = tuple[Camera, Response]
 PIXEL_M = 0.1
 
 COARSE_STEP_M, COARSE_HALF_M, COARSE_BLUR_M = 0.2, 18.0, 0.4
-# How far apart two views may be to be found.
+# Largest displacement of two views that is found.
 REACH_M = 8.0
 # Shifts that leave less than this part of the common region are not judged.
 LEAST_COMMON = 0.3
@@ -42,7 +42,7 @@ NEAR_M, ALIKE = 0.5, 0.7
 
 # Sampled finely, so that no edge of a line falls between two samples; once blurred, fewer will do.
 FINE_STEP_M, FINE_HALF_M = 0.05, 12.0
-# What is expected of a camera that is out of place, rad and m: the paper's Start errors.
+# Expected error of a camera that is out of place, rad and m: the paper's Start errors.
 EXPECTED = np.array([0.02, 0.02, 0.02, 0.16, 0.16, 0.16])
 # Blur in metres, every which sample (half a blur apart), and the part of what is expected that is expected at least in
 # each step. Coarse to fine; the last blur is about what a far camera smears: with less, the smear of two cameras that
@@ -64,9 +64,9 @@ LOOSE_M = 0.1
 # Below these the views show nothing in common.
 LEAST_SUPPORT_M = 4.0
 LEAST_CORRELATION = 0.3
-# As much line across a direction holds the views in it.
+# Length of line across a direction that holds the views in it.
 HOLDING_M = 8.0
-# What a metre of line is expected to say about where it is.
+# Expected error of the place of a metre of line.
 EXPECTED_NOISE_M = 0.05
 
 
@@ -230,7 +230,7 @@ def _guesses(pitch: Field, segmented: Sequence[Segmented], centre: Array) -> lis
     shift = _coarse_shift(views[0], views[1], pitch.line_width)
     if shift is None:
         return []
-    # Where the cameras put the markings of the centre, roughly: the displacement is measured there and not beside it.
+    # Rough place of the markings of the centre by the cameras: the displacement is measured there and not beside it.
     template = _template(pitch, centre)
     placed = [put for put in (_coarse_shift(template, view, pitch.line_width) for view in views) if put is not None]
     middle = centre + np.mean(placed or [np.zeros(2)], axis=0)
@@ -376,7 +376,7 @@ def _moved(
 ) -> tuple[list[Response], Mask]:
     """Return both views at every `stride`th point after some moves (12,) of their cameras, and the mask of points
     both see."""
-    # As plain matrices, which multiply ten times faster.
+    # Plain matrices multiply ten times faster.
     offsets = [
         (forms[..., its].reshape(-1, 6) @ moves[its]).reshape(forms.shape[:3]) for its in (slice(6), slice(6, 12))
     ]
@@ -395,7 +395,7 @@ def _normal_equations(
     slope = np.einsum("md,mdj->mj", gradient, forms[active])
     slope[:, :6] *= -1
     residual = (a - b)[active].astype(float)
-    # What only one view has, players for one, must not pull (Geman and McClure's weight); lines still apart must.
+    # Features of one view only, such as players, must not pull (Geman and McClure's weight); lines still apart must.
     scale = OUTLIER * float(np.quantile(np.maximum(a, b)[active], 0.9)) if len(residual) else 1.0
     weight = 1 / (1 + (residual / scale) ** 2) ** 2
     # The blur makes neighbours alike: this many pixels count as one.

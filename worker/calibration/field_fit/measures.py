@@ -184,7 +184,7 @@ def _with_known(
     """Return the given field with the known measures, and those of them that are found along with poses."""
     pitch, still_free = given, []
     for parameter, measure in zip(free, measures, strict=True):
-        # What lies below the corners by no more than chance is a flat pitch.
+        # A ridge below the corners by no more than chance is a flat field.
         flat = parameter.name == "ridge_height_m" and -SURE_DIP * measure.sigma < measure.value <= 0
         if flat:
             pitch = pitch.flat()

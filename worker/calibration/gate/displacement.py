@@ -116,7 +116,7 @@ def relative_focal_length(anchor: Camera, found: CameraResult) -> RelativeFocalL
     before = anchor.intrinsics.focal_length_px
     tonight = found.camera.intrinsics.focal_length_px
     if not found.lens_found:
-        # What the lines say beside the lens that was taken for known; a lens that was found has it already.
+        # The estimate relative to the lens taken for known; a lens that was found has it already.
         tonight += found.zoom.value
     return RelativeFocalLength(tonight / before - 1, found.zoom.sigma / before)
 

@@ -172,7 +172,7 @@ class Intrinsics(Lens):
                 axis=-1,
             )
             with np.errstate(divide="ignore", invalid="ignore"):
-                # Where the map stands still there is nowhere to go.
+                # No step where the map is stationary.
                 move = np.where(determinant[..., None] == 0, np.nan, move / determinant[..., None])
             rays = self._pulled_back(rays + move)
             if np.nanmax(np.abs(move), initial=0.0) < 1e-12:
@@ -186,7 +186,7 @@ class Intrinsics(Lens):
     def largest_radius(self) -> float:
         """Undistorted radius (at depth 1) up to which the radial model grows."""
         k1, k2, _, _, k3, k4, k5, k6 = self.coefficients[:8]
-        # Of a long lens the whole picture lies within some thousandths.
+        # The whole picture of a long lens lies within some thousandths.
         radii = np.concatenate([[0.0], np.geomspace(1e-5, 0.1, 1000)[:-1], np.linspace(0.1, 20.0, 19901)])
         r2 = radii**2
         denominator = 1 + r2 * (k4 + r2 * (k5 + r2 * k6))

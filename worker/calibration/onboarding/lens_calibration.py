@@ -136,7 +136,7 @@ def calibrate_lens(
     for number in range(ROUNDS):
         chosen = _choose(list(used.values()), size, model, _part(report, number))
         bad = _hurting(list(used), chosen.best.left_out_by_photo, most - len(hurting))
-        # What the last round would leave out has been fitted, and its figures are those of that fit.
+        # Photos that the last round would leave out have been fitted, and their figures are those of that fit.
         if not bad or number == ROUNDS - 1:
             break
         hurting |= bad
@@ -167,7 +167,7 @@ def _require_enough(used: Mapping[str, BoardDetection], photos: Sequence[Photo])
         )
 
 
-# Which lens
+# Choice of the lens
 
 
 @dataclass(frozen=True)
@@ -247,7 +247,7 @@ def _jackknife(parts: Array) -> Array:
     return np.sqrt((len(parts) - 1) * np.mean((parts - parts.mean(axis=0)) ** 2, axis=0))
 
 
-# Which photos
+# Choice of the photos
 
 
 def _hurting(names: Sequence[str], left_out_px: Array, most: int) -> dict[str, float]:
@@ -347,7 +347,7 @@ def _worse(sigma: Mapping[str, float], spread: Mapping[str, float]) -> dict[str,
     return {name: max(sigma[name], spread[name]) for name in sigma}
 
 
-# What it is worth
+# Coverage and warnings
 
 
 def measure_coverage(corners: Array, size: tuple[int, int]) -> Coverage:

@@ -178,7 +178,7 @@ class _Problem:
     def covariance(self, camera: Camera, change: Array, weights: Array) -> Array:
         """Return the covariance of pose and free parameters, from inverse variances of the clicks (N,)."""
         normal, _ = self._normal(camera, change, weights)
-        # What the clicks do not fix has an infinite variance; as good as infinite will do, nothing less.
+        # A direction that the clicks do not fix has an infinite variance; as good as infinite will do, nothing less.
         weakest = np.concatenate([np.full(POSE_NUMBERS, UNFIXED**-2), np.zeros(len(self.index))])
         return np.linalg.inv(normal + np.diag(weakest)).astype(float)
 

@@ -82,7 +82,7 @@ class CrossChecks:
             values.append(covariance @ (mixing.T @ pull + prior @ mean))
             covariances.append(covariance)
             noises.append(covariance @ (mixing.T @ said.spread @ mixing) @ covariance)
-        # What both believe before any line is the same error in both, and they differ in how far they follow it.
+        # The prior's error is the same in both, and they differ in how far they follow it.
         shared = covariances[0] - covariances[1]
         errors = len(found.value)
         difference = values[0] - values[1]

@@ -182,7 +182,7 @@ def weigh_rows(rows: Sequence[Rows], heights: Array, unknowns: Unknowns, weigh: 
     local = np.stack([_joined([r.across for r in rows]), _joined([r.up for r in rows])], axis=1)
     residual = _joined([r.offset for r in rows]) - local[:, 1] * ground.under_points(heights, point)
     noise = _joined([r.noise_px for r in rows]) ** 2
-    # Of paint beside its place, and of the ground under it beside the smooth ground, m².
+    # Prior variance of the paint across the line, and of the ground under it beside the smooth ground, m².
     by_itself = np.array([PAINT_M**2, ground.usual_m**2])
     expected = noise + (local**2) @ by_itself
     value = residual / np.sqrt(expected)
@@ -340,6 +340,6 @@ def misfit_px(offset: Array, measured: Measurements) -> float:
         return 0.0
     offset, measured = offset[known], measured[known]
     explained = measured.sigma_px**2 - measured.misfit_px**2 * measured.alike
-    # What each offset would need for itself to be a usual one; half of them need less than their median.
+    # The further variance that makes each offset a usual one; half of them need less than their median.
     needed = ((offset / USUAL) ** 2 - explained) / measured.alike
     return float(np.sqrt(max(np.median(needed), 0.0)))

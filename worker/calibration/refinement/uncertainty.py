@@ -284,8 +284,8 @@ class _Judgement:
     def of(cls, here: Estimate, believed: Priors, information: MarginalInformation) -> _Judgement:
         known = believed.mixing.T @ information.known @ believed.mixing
         found = _posterior(believed, information)
-        # How far a camera moved helps to tell a zoom from a move. That it has not is no measurement of where it is: if
-        # the lenses are what they are said to be, lines alone have to determine it.
+        # The movement of a camera helps to tell a zoom from a move. That it has not moved is no measurement of where it
+        # is: if the lenses are what they are said to be, lines alone have to determine it.
         certainty = found.certainty.copy()
         for group in (group for block in believed.blocks for group in block):
             certainty[group.which] = np.maximum(certainty[group.which], group.certainty(1.0))

@@ -60,7 +60,7 @@ def _expected_and_found(
     x, y = focal * moved[:, 0] / depth, focal * moved[:, 1] / depth
     if cameras.bends.any():
         bent = cameras.bends.astype(np.float32)[:, None] * (x * x + y * y) / HALF_WIDTH_PX**2
-        # Where a lens would bend the picture back nothing is seen.
+        # Nothing is seen where a lens would bend the picture back.
         ahead &= 3 * bent > -1
         x, y = x * (1 + bent), y * (1 + bent)
     height, width = view.distance.shape

@@ -61,11 +61,11 @@ def _stepped(field: FieldMap, view: LineView, cameras: Hypotheses, tolerance_px:
     push = np.concatenate([focal[..., None] * across, -(seen * across).sum(axis=-1, keepdims=True)], axis=-1)
     push /= depth[..., None]
     radial = (seen * across).sum(axis=-1)
-    # What is known of a lens has no slope, and so stays exactly as it is.
+    # A known lens parameter has a Jacobian of 0, and so stays exactly as it is.
     of_lens = np.stack([radial * (lens.focal > 0), radial * outwards * (lens.bend > 0)], axis=-1)
     slopes = np.concatenate([np.cross(ahead_of, push), push, of_lens], axis=-1)
     reach = (depth * counted).sum(axis=1) / np.maximum(counted.sum(axis=1), 1)
-    # Where nothing is counted nothing is measured, and the step is none.
+    # Without counted points nothing is measured, and the step is none.
     reach = np.where(reach > 0, reach, 1.0)
     spread = np.empty((len(cameras), 8))
     spread[:, :3], spread[:, 3:6] = TURN_RAD, SHIFT * reach[:, None]

@@ -256,7 +256,7 @@ def explains_nearly_as_well(other: Candidate, best: Candidate) -> bool:
     return (
         its < MORE_MISSED * missed + FEW_MISSED
         or other.explained > best.explained + MORE_EXPLAINED
-        # What misses clearly more, and explains nothing that the best does not explain, is a worse reading of the same.
+        # A pose that misses clearly more, and explains nothing beyond the best, is a worse reading of the same.
         or (has_paint_of_its_own and other.overlap.iou > RIVAL_OVERLAP * best.overlap.iou)
     )
 

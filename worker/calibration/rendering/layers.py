@@ -24,7 +24,7 @@ STORED_STROKE, NEW_STROKE = 0.0016, 0.001
 MASK_OPACITY = 0.8
 # Nobody sees more steps of it, and every one makes the file larger; below the first, the network says no.
 MASK_STEPS = 8
-# Of the seam, in pixels: painted, then bare.
+# Length of the seam's dashes and gaps, and its width, in pixels.
 DASH_PX, SEAM_PX = 14, 2
 
 

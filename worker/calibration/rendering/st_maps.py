@@ -15,7 +15,7 @@ from worker.calibration.geometry.camera import Array
 from worker.calibration.geometry.lens import Lens
 
 StMap = NDArray[np.float32]
-# Of pixels that nothing is behind: outside of every picture, and no NaN, which compositors spread.
+# Value of pixels that nothing is behind: outside of every picture, and no NaN, which compositors spread.
 NOWHERE = -1.0
 # Rows at a time: memory is bounded by the stripe, not by the picture.
 STRIPE = 64

@@ -20,7 +20,7 @@ from worker.calibration.geometry.ground_view import box, quality, sampled
 from worker.calibration.stitching.photometry import NEUTRAL, Light
 from worker.calibration.stitching.views import StitchedView
 
-# What no camera sees: dark grey rather than black, so that it reads as "outside" and not as "broken".
+# Colour of what no camera sees: dark grey rather than black, so that it reads as "outside" and not as "broken".
 BACKDROP = 38
 # Geometry is computed at every n-th pixel and interpolated; the tests hold it below 0.05 px.
 GEOMETRY_STEP = 4

@@ -25,7 +25,7 @@ EXPOSED = (16, 240)
 LEAST_PLACES = 100
 # Logarithms. What is left between two cameras at a place, and how many places of a pair are as good as independent.
 NOISE, INDEPENDENT = 0.05, 20
-# How far log gains, contrasts and falloffs are expected from 0: cameras of one rig are alike.
+# Prior sigmas of log gains, contrasts and falloffs around 0: cameras of one rig are alike.
 GAIN_SIGMA, CONTRAST_SIGMA, FALLOFF_SIGMA = 0.3, 0.1, 0.1
 # Beyond this it is no matter of exposure.
 LARGEST_GAIN, LARGEST_CONTRAST, LARGEST_FALLOFF = 1.5, 0.3, 0.4
@@ -39,7 +39,7 @@ SEAMS, BAND = np.linspace(-1.5, 1.5, 31), 0.2
 HOLD = 0.005
 # Log differences above this are all alike: somebody stands there.
 OUTRIGHT = 0.7
-# How far reaches are expected from 0, beside a seam that is known to `SEAM_SIGMA`.
+# Prior sigma of reaches around 0, and sigma of the place of a seam.
 REACH_SIGMA, SEAM_SIGMA = 1.0, 0.2
 
 

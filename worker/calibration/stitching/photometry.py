@@ -11,7 +11,7 @@ from worker.calibration.geometry.camera import Array
 
 # The grey level that a contrast leaves as it is.
 MIDDLE = 100.0
-# How much of a new estimate counts beside what was kept.
+# Weight of a new estimate beside the one kept.
 NEW_SHARE = 0.25
 
 

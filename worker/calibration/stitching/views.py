@@ -20,16 +20,16 @@ LevelProjection = Literal["pannini", "cylinder", "rectilinear"]
 TOO_WIDE_DEG, STANDING_BACK_DEG = 80.0, 60.0
 # A view shows this much around the visible pitch, in widths and heights of it in the picture.
 AROUND_SIDES, AROUND_ABOVE, AROUND_BELOW = 0.03, 0.8, 0.15
-# Of the pitch from above, in metres.
+# Margin around the field from above, in metres.
 AROUND_PITCH_M = 3.0
 # Least and largest height of a view in widths.
 HEIGHT_TO_WIDTH = 0.15, 1.0
 # Widest field of view of each projection; beyond it the picture is mostly its own corners.
 WIDEST_DEG: dict[LevelProjection, float] = {"pannini": 270.0, "cylinder": 340.0, "rectilinear": 140.0}
-# Of a view that is panned away from all of the pitch.
+# Field of view where the view is panned away from all of the field.
 NOTHING_SEEN_DEG = 90.0
-# Where it stands, looks and ends is rounded (metres, degrees, parts of the focal length): a night's wind, which moves
-# cameras by millimetres, moves the view not at all, and no graphics that somebody laid over it.
+# Steps of a view's place, direction and window (metres, degrees, parts of the focal length): a night's wind, which
+# moves cameras by millimetres, moves the view not at all, and no graphics that somebody laid over it.
 STAND_STEP_M, AXIS_STEP_DEG, WINDOW_STEP = 0.25, 0.5, 0.02
 # "Infinity": far beyond any parallax between cameras, near enough for float64.
 FAR_M = 1e6

@@ -106,7 +106,7 @@ def smoothed(steps: Sequence[FilterStep]) -> list[State]:
         gain = np.linalg.solve(foretold.covariance, onward @ before.known.covariance).T
         kept = np.eye(len(gain)) - gain @ onward
         mean = before.known.mean + gain @ (known[-1].mean - foretold.mean)
-        # As a sum of what can be no less than nothing.
+        # A sum of positive semidefinite matrices.
         later_too = known[-1].covariance + _unforeseen(later.seconds)
         known.append(State(mean, kept @ before.known.covariance @ kept.T + gain @ later_too @ gain.T))
     return known[::-1]
