@@ -36,7 +36,7 @@ def tukey_weights(values: Array) -> Array:
     return np.maximum(0.0, 1 - (values / (TUKEY * scale)) ** 2) ** 2 / scale**2
 
 
-def tukey_slopes(values: Array) -> Array:
+def tukey_derivatives(values: Array) -> Array:
     """Return the mean derivative (M,) of a residual's influence under Tukey's weights: each weight times the same
     factor.
 
@@ -45,8 +45,8 @@ def tukey_slopes(values: Array) -> Array:
     """
     weights = tukey_weights(values)
     within = np.minimum((values / (TUKEY * robust_scale(values))) ** 2, 1.0)
-    slopes, all_of = (1 - within) * (1 - 5 * within), (1 - within) ** 2
-    return weights * slopes.sum() / all_of.sum() if len(values) else weights
+    derivatives, all_of = (1 - within) * (1 - 5 * within), (1 - within) ** 2
+    return weights * derivatives.sum() / all_of.sum() if len(values) else weights
 
 
 def tukey_loss(values: Array, scale: float) -> Array:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from worker.calibration.geometry.camera import Array, Camera, Frame, Pose
-from worker.calibration.geometry.derivatives import pixel_slopes
+from worker.calibration.geometry.derivatives import pixel_jacobian
 from worker.calibration.geometry.lens import Lens
 from worker.calibration.geometry.rotation import rotation_matrices
 
@@ -105,11 +105,11 @@ def _turn(first: Grey, later: Grey, corners: NDArray[np.floating], lens: Lens) -
     if len(before) < FEWEST_FOLLOWED:
         return np.zeros(3)
     camera = _at_origin(lens)
-    slopes = pixel_slopes(camera, camera.rays(before))[..., :3]
-    counted = np.isfinite(slopes).all(axis=(1, 2))
+    jacobian = pixel_jacobian(camera, camera.rays(before))[..., :3]
+    counted = np.isfinite(jacobian).all(axis=(1, 2))
     for _ in range(2):
-        turn = np.linalg.lstsq(slopes[counted].reshape(-1, 3), (after - before)[counted].ravel(), rcond=None)[0]
-        off = np.linalg.norm(after - before - slopes @ turn, axis=1)
+        turn = np.linalg.lstsq(jacobian[counted].reshape(-1, 3), (after - before)[counted].ravel(), rcond=None)[0]
+        off = np.linalg.norm(after - before - jacobian @ turn, axis=1)
         counted &= off <= OUTLIER * np.sqrt(np.mean(off[counted] ** 2))
     return np.asarray(turn, dtype=float)
 

@@ -25,7 +25,7 @@ from worker.calibration.detection.line_matching import (
 from worker.calibration.detection.line_profile import blurred_point, blurred_step, without_nan
 from worker.calibration.detection.sampling import bilinear
 from worker.calibration.geometry.camera import Array, Camera, Plane
-from worker.calibration.geometry.derivatives import lens_slopes, pixel_slopes
+from worker.calibration.geometry.derivatives import lens_jacobian, pixel_jacobian
 from worker.calibration.geometry.field import LinePoints
 from worker.calibration.geometry.visibility import VisibleLines
 
@@ -88,13 +88,13 @@ class Measurements:
         measured."""
         return np.asarray(np.sum((self.pixel - camera.project(positions)) * self.normal, axis=1))
 
-    def slopes(self, camera: Camera, positions: Array) -> Array:
+    def jacobian(self, camera: Camera, positions: Array) -> Array:
         """Jacobian (M, 6) of `offset` by the camera's pose, per rad and metre (see `derivatives`)."""
-        return -np.einsum("mij,mi->mj", pixel_slopes(camera, positions), self.normal)
+        return -np.einsum("mij,mi->mj", pixel_jacobian(camera, positions), self.normal)
 
-    def lens_slopes(self, camera: Camera, positions: Array) -> Array:
-        """Jacobian (M, 6) of `offset` by `LENS_NUMBERS` of the camera's lens, px per unit of each."""
-        return -np.einsum("mij,mi->mj", lens_slopes(camera, positions), self.normal)
+    def lens_jacobian(self, camera: Camera, positions: Array) -> Array:
+        """Jacobian (M, 6) of `offset` by `LENS_PARAMETERS` of the camera's lens, px per unit of each."""
+        return -np.einsum("mij,mi->mj", lens_jacobian(camera, positions), self.normal)
 
     @property
     def sigma_px(self) -> Array:

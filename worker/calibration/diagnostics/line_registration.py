@@ -78,21 +78,21 @@ def register_lines(pitch: Field, first: MeasuredLines, second: MeasuredLines) ->
     return Registration(float(dx), float(dy), support_m, (first.camera.id, second.camera.id), centre, told)
 
 
-def _moves(slopes: Array, apart: Array, sigma: Array, spacing_m: float, at_centre: Array) -> tuple[Array, Array]:
+def _moves(jacobian: Array, apart: Array, sigma: Array, spacing_m: float, at_centre: Array) -> tuple[Array, Array]:
     """Return the turns and moves (12,) of both cameras that explain distances `apart` (M,) m, and their covariance.
 
-    `slopes` (M, 12): Jacobian of those by the moves; `at_centre` (2, 12): of the displacement there. The prior shrinks
-    with the displacement found, and the covariance is that of cameras with the full prior.
+    `jacobian` (M, 12): of those by the moves; `at_centre` (2, 12): of the displacement there. The prior shrinks with
+    the displacement found, and the covariance is that of cameras with the full prior.
     """
     expected = np.linalg.inv(at_centre @ at_centre.T)
     alike = max(ALIKE_M / spacing_m, 1.0)
-    moves: Array = np.zeros(slopes.shape[1])
+    moves: Array = np.zeros(jacobian.shape[1])
     for least in LEASTS:
-        weight = huber_weights((apart - slopes @ moves) / sigma) / (sigma**2 * alike)
-        information = (slopes * weight[:, None]).T @ slopes
+        weight = huber_weights((apart - jacobian @ moves) / sigma) / (sigma**2 * alike)
+        information = (jacobian * weight[:, None]).T @ jacobian
         found = at_centre @ moves
         prior = 1 / max(float(found @ expected @ found), least**2)
         moves = np.asarray(
-            np.linalg.solve(information + prior * np.eye(len(moves)), slopes.T @ (weight * apart)), float
+            np.linalg.solve(information + prior * np.eye(len(moves)), jacobian.T @ (weight * apart)), float
         )
     return moves, np.asarray(np.linalg.inv(information + np.eye(len(moves))), dtype=float)

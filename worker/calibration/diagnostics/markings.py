@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from worker.calibration.detection.contrast import Channels
 from worker.calibration.detection.line_measurement import Measurements, measure_lines
 from worker.calibration.geometry.camera import Array, Camera
-from worker.calibration.geometry.derivatives import POSE_NUMBERS, pixel_slopes
+from worker.calibration.geometry.derivatives import POSE_NUMBERS, pixel_jacobian
 from worker.calibration.geometry.field import Field, LinePoints
 from worker.calibration.geometry.ground import Ground
 from worker.calibration.geometry.parameters import lens_parameters
@@ -220,7 +220,7 @@ class _Means:
 class _Offsets:
     """Measured points M of one camera: `group` of markings and `patch` of line of each.
 
-    `offset` (M,) px along their normals, `scale` (M,) px per metre, `sigma` (M,) px; `slopes` (M, 6) of the offset by
+    `offset` (M,) px along their normals, `scale` (M,) px per metre, `sigma` (M,) px; `jacobian` (M, 6) of the offset by
     the pose, and what the pose `gives` (6, M): how it moves for an offset of one sigma there; `alike` (M, C): how far
     they seem to move across their lines, m, by one standard deviation of what moves many of them: parts of the ground
     and parameters of the lens.
@@ -231,7 +231,7 @@ class _Offsets:
     offset: Array
     scale: Array
     sigma: Array
-    slopes: Array
+    jacobian: Array
     gives: Array
     alike: Array
 
@@ -243,25 +243,25 @@ class _Offsets:
         camera = found.camera
         here = lines.position[measured.index]
         offset = np.sum((measured.pixel - camera.project(here)) * measured.normal, axis=1)
-        slopes = np.einsum("mij,mi->mj", pixel_slopes(camera, here), measured.normal)
-        known = np.isfinite(offset) & np.isfinite(slopes).all(axis=1)
+        jacobian = np.einsum("mij,mi->mj", pixel_jacobian(camera, here), measured.normal)
+        known = np.isfinite(offset) & np.isfinite(jacobian).all(axis=1)
         if known.sum() < FEWEST_MEASURED:
             return None
-        measured, offset, slopes = measured[known], offset[known], slopes[known]
+        measured, offset, jacobian = measured[known], offset[known], jacobian[known]
         sigma = measured.sigma_px
         ground = Ground.under(lines)
         rises = _rises(ground, measured)
         # The pose has not followed markings that were painted anew.
         asked = ~np.isin(lines.marking[measured.index], found.repainted_markings)
-        gives = _given_way(ground, rises, measured, slopes, asked * tukey_weights(offset / sigma), found.uneven_m)
+        gives = _given_way(ground, rises, measured, jacobian, asked * tukey_weights(offset / sigma), found.uneven_m)
         swell = found.uneven_m * np.linalg.cholesky(np.linalg.inv(ground.precision))
         by_lens = _by_lens(camera, here[known], measured)
         # The pose follows what a lens has wrong: what of it is left moves lines.
-        by_lens = by_lens - slopes @ (gives @ (by_lens / sigma[:, None]))
+        by_lens = by_lens - jacobian @ (gives @ (by_lens / sigma[:, None]))
         alike = np.concatenate([rises @ swell, by_lens], axis=1) / measured.px_per_metre[:, None]
         of_group = group[lines.marking[measured.index]]
         patch = np.unique(np.stack([of_group, measured.index // CLUSTER_POINTS]), axis=1, return_inverse=True)[1]
-        return cls(of_group, patch.ravel(), offset, measured.px_per_metre, sigma, slopes, gives, alike)
+        return cls(of_group, patch.ravel(), offset, measured.px_per_metre, sigma, jacobian, gives, alike)
 
     def means(self) -> _Means:
         """Return the mean offset of each group by its measurements."""
@@ -279,7 +279,7 @@ class _Offsets:
             alike = weight @ self.alike[its] / told
             mean.append(middle)
             variance.append(spread / told**2 + float(alike @ alike))
-            says.append((weight / self.scale[its]) @ self.slopes[its] / told)
+            says.append((weight / self.scale[its]) @ self.jacobian[its] / told)
         moves = [self.gives[:, self.group == n] @ (self.scale / self.sigma)[self.group == n] for n in numbers]
         carried = np.array(says).reshape(-1, POSE_NUMBERS) @ np.array(moves).reshape(-1, POSE_NUMBERS).T
         return _Means(numbers, np.array(mean), np.array(variance), carried)
@@ -322,18 +322,18 @@ def _by_lens(camera: Camera, points: Array, measured: Measurements) -> Array:
     """Return the moves (M, 6), in px along their normals, of points (M, 3) by one sigma of each parameter of the
     lens."""
     expected = np.array([number.expected for number in lens_parameters([camera])])
-    return np.nan_to_num(-measured.lens_slopes(camera, points) * expected)
+    return np.nan_to_num(-measured.lens_jacobian(camera, points) * expected)
 
 
 def _given_way(
-    ground: Ground, rises: Array, measured: Measurements, slopes: Array, weight: Array, uneven_m: float
+    ground: Ground, rises: Array, measured: Measurements, jacobian: Array, weight: Array, uneven_m: float
 ) -> Array:
     """Return the moves of the pose (6, M) for an offset of one sigma at each measured point, where the ground gives way
     as well.
 
-    `slopes` (M, 6) of the offsets by the pose; `weight` (M,) that the refinement gave them.
+    `jacobian` (M, 6) of the offsets by the pose; `weight` (M,) that the refinement gave them.
     """
-    by_sigma = np.concatenate([slopes, rises], axis=1) / measured.sigma_px[:, None]
+    by_sigma = np.concatenate([jacobian, rises], axis=1) / measured.sigma_px[:, None]
     weighted = by_sigma * weight[:, None]
     information = weighted.T @ by_sigma
     information[:POSE_NUMBERS, :POSE_NUMBERS] += np.diag([PRIOR_RAD**-2] * 3 + [PRIOR_M**-2] * 3)

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from worker.calibration.geometry.camera import Array, Camera
-from worker.calibration.geometry.derivatives import ground_slopes
+from worker.calibration.geometry.derivatives import ground_jacobian
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.ground_view import Mask, ground_grid, ground_view
 
@@ -185,8 +185,8 @@ def directions_in_common(pitch: Field, first: Camera, second: Camera, centre: Ar
     common = lines[seen & near]
     across = common.normal[:, :2]
     enough = np.linalg.eigvalsh(lines.spacing * across.T @ across) > HOLDING_M
-    slope = (across[:, :, None] * forms_of_both(first, second, common.position)).sum(axis=1)
-    information = lines.spacing / EXPECTED_NOISE_M**2 * slope.T @ slope
+    jacobian = (across[:, :, None] * forms_of_both(first, second, common.position)).sum(axis=1)
+    information = lines.spacing / EXPECTED_NOISE_M**2 * jacobian.T @ jacobian
     at_centre = forms_of_both(first, second, pitch.lift(centre))
     covariance = at_centre @ np.linalg.inv(information + np.eye(len(information))) @ at_centre.T
     held = np.linalg.eigvalsh(covariance) < LOOSE_M**2
@@ -310,7 +310,7 @@ def _forms(camera: Camera, points: Array) -> Array:
 
     One column per expected turn about each axis of the camera and move along each axis of the world.
     """
-    return ground_slopes(camera, points) * EXPECTED
+    return ground_jacobian(camera, points) * EXPECTED
 
 
 def forms_of_both(first: Camera, second: Camera, points: Array) -> Array:
@@ -392,8 +392,8 @@ def _normal_equations(
     active = valid & (a + b > LEAST_RESPONSE)
     down, right = np.gradient(a + b)
     gradient = np.stack([right[active], -down[active]], axis=-1).astype(float) / (2 * step_m)
-    slope = np.einsum("md,mdj->mj", gradient, forms[active])
-    slope[:, :6] *= -1
+    jacobian = np.einsum("md,mdj->mj", gradient, forms[active])
+    jacobian[:, :6] *= -1
     residual = (a - b)[active].astype(float)
     # Features of one view only, such as players, must not pull (Geman and McClure's weight); lines still apart must.
     scale = OUTLIER * float(np.quantile(np.maximum(a, b)[active], 0.9)) if len(residual) else 1.0
@@ -401,9 +401,9 @@ def _normal_equations(
     # The blur makes neighbours alike: this many pixels count as one.
     alike = 4 * np.pi * (blur / step_m) ** 2
     noise = SAMPLING_NOISE**2 + (weight * residual**2).sum() / max(weight.sum(), 1.0)
-    weighted = slope * (weight / (noise * alike))[:, None]
+    weighted = jacobian * (weight / (noise * alike))[:, None]
     # einsum rather than matrix products, so that the number of threads cannot change a digit.
-    return np.einsum("mi,m->i", weighted, residual), np.einsum("mi,mj->ij", weighted, slope)
+    return np.einsum("mi,m->i", weighted, residual), np.einsum("mi,mj->ij", weighted, jacobian)
 
 
 def _smooth(view: BirdsEye, blur_m: float, step_m: float, line_width: float) -> Response:

@@ -13,7 +13,7 @@ import numpy as np
 
 from worker.calibration.gate.quality import CameraResult
 from worker.calibration.geometry.camera import Array, Camera
-from worker.calibration.geometry.derivatives import ground_slopes
+from worker.calibration.geometry.derivatives import ground_jacobian
 from worker.calibration.geometry.far_marking import on_the_ground
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.parameters import with_focal_length
@@ -56,9 +56,9 @@ def measure_displacement(pitch: Field, anchor: Camera, found: CameraResult) -> D
         return None
     axes = sight_axes(anchor, place)
     moved = ground_point(found.camera, anchor.project(place), place[2])
-    slopes = axes @ ground_slopes(anchor, place)
+    jacobian = axes @ ground_jacobian(anchor, place)
     with np.errstate(invalid="ignore"):
-        sigma = np.sqrt(np.diag(slopes @ found.covariance @ slopes.T))
+        sigma = np.sqrt(np.diag(jacobian @ found.covariance @ jacobian.T))
     if not (np.isfinite(moved).all() and np.isfinite(sigma).all()):
         return None
     return Displacement(

@@ -26,47 +26,47 @@ def change_between(before: Camera, after: Camera) -> Array:
     return np.concatenate([turn, after.pose.position - before.pose.position])
 
 
-def pixel_slopes(camera: Camera, points: Array) -> Array:
+def pixel_jacobian(camera: Camera, points: Array) -> Array:
     """Jacobian (..., 2, 6) of the pixels of world points (..., 3) by the pose, px per rad and metre.
 
     NaN where `Camera.project` is.
     """
     seen = _in_camera(camera, points)
     rays = _rays(seen)
-    by_ray = camera.intrinsics.slopes(rays)
+    by_ray = camera.intrinsics.jacobian(rays)
     by_point = np.concatenate([by_ray, -(by_ray @ rays[..., None])], axis=-1) / seen[..., 2:, None]
     # A turn w moves a point p by w x p, and b . (w x p) is w . (p x b); a shift of the camera moves it the other way.
     return np.concatenate([np.cross(seen[..., None, :], by_point), -by_point @ camera.pose.matrix], axis=-1)
 
 
-def lens_slopes(camera: Camera, points: Array) -> Array:
-    """Jacobian (..., 2, 6) of the pixels of world points (..., 3) by `LENS_NUMBERS`, px per unit of each.
+def lens_jacobian(camera: Camera, points: Array) -> Array:
+    """Jacobian (..., 2, 6) of the pixels of world points (..., 3) by `LENS_PARAMETERS`, px per unit of each.
 
     NaN where `Camera.project` is.
     """
-    return camera.intrinsics.slopes_by_numbers(_rays(_in_camera(camera, points)))
+    return camera.intrinsics.jacobian_by_parameters(_rays(_in_camera(camera, points)))
 
 
-def pixel_slopes_of_all(camera: Camera, points: Array) -> Array:
-    """Jacobian (..., 2, 12) of the pixels by pose and lens, px per rad, metre and unit of `LENS_NUMBERS`."""
-    return np.concatenate([pixel_slopes(camera, points), lens_slopes(camera, points)], axis=-1)
+def full_pixel_jacobian(camera: Camera, points: Array) -> Array:
+    """Jacobian (..., 2, 12) of the pixels by pose and lens, px per rad, metre and unit of `LENS_PARAMETERS`."""
+    return np.concatenate([pixel_jacobian(camera, points), lens_jacobian(camera, points)], axis=-1)
 
 
-def ground_slopes(camera: Camera, points: Array) -> Array:
+def ground_jacobian(camera: Camera, points: Array) -> Array:
     """Jacobian (..., 2, 6) of ground positions, m per rad and metre of error in the pose.
 
     The camera sees points (..., 3) at given pixels and back-projects those onto the level ground through each point.
     """
     ray = points - camera.pose.position
-    carried = -camera.pose.matrix.T @ _point_slopes(camera, _in_camera(camera, points))
+    carried = -camera.pose.matrix.T @ _point_jacobian(camera, _in_camera(camera, points))
     # The changed ray, back to where it meets the ground.
     return np.asarray(carried[..., :2, :] - ray[..., :2, None] * carried[..., 2:, :] / ray[..., 2, None, None])
 
 
-def ground_slopes_of_all(camera: Camera, points: Array) -> Array:
+def full_ground_jacobian(camera: Camera, points: Array) -> Array:
     """Jacobian (..., 2, 12) of ground positions by errors in pose and lens, per rad, metre and unit of
-    `LENS_NUMBERS`."""
-    by_all = pixel_slopes_of_all(camera, points)
+    `LENS_PARAMETERS`."""
+    by_all = full_pixel_jacobian(camera, points)
     # A camera that is shifted along the ground puts all of it there.
     by_ground = by_all[..., 3:5]
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -85,7 +85,7 @@ def _rays(seen: Array) -> Array:
     return seen[..., :2] / np.where(depth > NEAREST_DEPTH_M, depth, np.nan)
 
 
-def _point_slopes(camera: Camera, seen: Array) -> Array:
+def _point_jacobian(camera: Camera, seen: Array) -> Array:
     """Jacobian (..., 3, 6) of points (..., 3) in the camera's frame by its pose: w x p for a turn w, and minus the
     shift."""
     shift = np.broadcast_to(-camera.pose.matrix, (*seen.shape, 3))

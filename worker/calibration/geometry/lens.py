@@ -25,10 +25,10 @@ WIDEST_FISHEYE_RAD = np.radians(89.0)
 """Largest angle off the axis at which a fisheye is used: from a right angle on there are no image coordinates at depth
 1."""
 IN_PIXELS = ("fx", "fy", "cx", "cy")
-LENS_NUMBERS = ("focal_length_px", "principal_point_x_px", "principal_point_y_px", "aspect", "k1", "k2")
+LENS_PARAMETERS = ("focal_length_px", "principal_point_x_px", "principal_point_y_px", "aspect", "k1", "k2")
 """Lens parameters that lines can determine: fx, with which fy changes in proportion; cx and cy; fy / fx, which changes
 fy alone; the first two coefficients of the distortion."""
-SIGMA_NAMES = dict(zip(LENS_NUMBERS, ("fx", "cx", "cy", "aspect", "k1", "k2"), strict=True))
+SIGMA_NAMES = dict(zip(LENS_PARAMETERS, ("fx", "cx", "cy", "aspect", "k1", "k2"), strict=True))
 """Names of these parameters in the `sigma` of a lens."""
 
 
@@ -60,21 +60,21 @@ class Lens(ABC):
         (fx, skew, cx), (_, fy, cy) = self.matrix[:2].tolist()
         return fx * xd + skew * yd + cx, fy * yd + cy
 
-    def slopes(self, rays: Array) -> Array:
+    def jacobian(self, rays: Array) -> Array:
         """Jacobian (..., 2, 2) of the pixels of rays (..., 2) by the rays; NaN beyond `largest_radius`."""
         return self.matrix[:2, :2] @ self._bent_by_ray(rays)
 
-    def slopes_by_numbers(self, rays: Array) -> Array:
-        """Jacobian (..., 2, 6) of the pixels of rays (..., 2) by `LENS_NUMBERS`; NaN beyond `largest_radius`."""
+    def jacobian_by_parameters(self, rays: Array) -> Array:
+        """Jacobian (..., 2, 6) of the pixels of rays (..., 2) by `LENS_PARAMETERS`; NaN beyond `largest_radius`."""
         xd, yd = self._bent(rays[..., 0], rays[..., 1])
         (fx, _), (_, fy) = self.matrix[:2, :2].tolist()
-        slopes = np.zeros((*rays.shape, len(LENS_NUMBERS)))
-        slopes[..., 0, 0], slopes[..., 1, 0] = xd, fy / fx * yd
-        slopes[..., 0, 1] = slopes[..., 1, 2] = 1.0
-        slopes[..., 1, 3] = fx * yd
-        slopes[..., 4:] = self.matrix[:2, :2] @ self._bent_by_terms(rays)
-        slopes[np.isnan(xd)] = np.nan
-        return slopes
+        jacobian = np.zeros((*rays.shape, len(LENS_PARAMETERS)))
+        jacobian[..., 0, 0], jacobian[..., 1, 0] = xd, fy / fx * yd
+        jacobian[..., 0, 1] = jacobian[..., 1, 2] = 1.0
+        jacobian[..., 1, 3] = fx * yd
+        jacobian[..., 4:] = self.matrix[:2, :2] @ self._bent_by_terms(rays)
+        jacobian[np.isnan(xd)] = np.nan
+        return jacobian
 
     @abstractmethod
     def undistort(self, pixels: ArrayLike) -> Array:
@@ -162,7 +162,7 @@ class Intrinsics(Lens):
         rays = (target - self.matrix[:2, 2]) @ np.linalg.inv(linear).T
         rays = self._pulled_back(rays * self._undistorted_scale(np.linalg.norm(rays, axis=-1))[..., None])
         for _ in range(iterations):
-            jacobian, miss = self.slopes(rays), target - self.distort(rays)
+            jacobian, miss = self.jacobian(rays), target - self.distort(rays)
             determinant = jacobian[..., 0, 0] * jacobian[..., 1, 1] - jacobian[..., 0, 1] * jacobian[..., 1, 0]
             move = np.stack(
                 [
@@ -239,7 +239,7 @@ class Intrinsics(Lens):
         radial, by_r2, _ = self._radial(r2)
         xd_by_r2, yd_by_r2 = x * by_r2 + s1 + 2 * s2 * r2, y * by_r2 + s3 + 2 * s4 * r2
         aside = 2 * (p1 * x + p2 * y)
-        slopes = np.stack(
+        jacobian = np.stack(
             [
                 radial + 2 * x * xd_by_r2 + 2 * p1 * y + 6 * p2 * x,
                 2 * y * xd_by_r2 + aside,
@@ -248,7 +248,7 @@ class Intrinsics(Lens):
             ],
             axis=-1,
         )
-        return self._on_tilted(x, y, slopes.reshape(*x.shape, 2, 2))
+        return self._on_tilted(x, y, jacobian.reshape(*x.shape, 2, 2))
 
     def _bent_by_terms(self, rays: Array) -> Array:
         x, y = np.moveaxis(self._within_model(rays), -1, 0)
@@ -266,15 +266,15 @@ class Intrinsics(Lens):
         by_r2 = k1 + r2 * (2 * k2 + r2 * 3 * k3) - radial * (k4 + r2 * (2 * k5 + r2 * 3 * k6))
         return radial, by_r2 / denominator, denominator
 
-    def _on_tilted(self, x: Array, y: Array, slopes: Array) -> Array:
+    def _on_tilted(self, x: Array, y: Array, jacobian: Array) -> Array:
         """Map a Jacobian (..., 2, n) of distorted coordinates of rays (...) to the tilted sensor."""
         if not self._is_tilted:
-            return slopes
+            return jacobian
         xd, yd = self._bent_upright(x, y)
         there = np.stack(self._tilted(xd, yd), axis=-1)
         depth = self.tilt[2, 0] * xd + self.tilt[2, 1] * yd + self.tilt[2, 2]
         by_upright = (self.tilt[:2, :2] - there[..., None] * self.tilt[2, :2]) / depth[..., None, None]
-        return by_upright @ slopes
+        return by_upright @ jacobian
 
     @property
     def _is_tilted(self) -> bool:
@@ -315,7 +315,7 @@ class Fisheye(Lens):
         angle = np.interp(distorted, self._distorted_angle(table), table)
         for _ in range(iterations):
             # At its very end the model may stand still.
-            step = (distorted - self._distorted_angle(angle)) / np.maximum(self._angle_slope(angle), 1e-6)
+            step = (distorted - self._distorted_angle(angle)) / np.maximum(self._angle_derivative(angle), 1e-6)
             angle = np.clip(angle + step, 0.0, self._largest_angle)
         known = np.abs(distorted - self._distorted_angle(angle)) * linear[0, 0] < 1e-3
         scale = np.where(distorted > 1e-9, np.tan(angle) / np.maximum(distorted, 1e-9), 1.0)
@@ -338,7 +338,7 @@ class Fisheye(Lens):
         t2 = angle * angle
         return angle * (1 + t2 * (k1 + t2 * (k2 + t2 * (k3 + t2 * k4))))
 
-    def _angle_slope(self, angle: Array) -> Array:
+    def _angle_derivative(self, angle: Array) -> Array:
         """Return the derivative of `_distorted_angle`."""
         k1, k2, k3, k4 = self.coefficients.tolist()
         t2 = angle * angle
@@ -358,7 +358,7 @@ class Fisheye(Lens):
     def _bent_by_ray(self, rays: Array) -> Array:
         radius, angle, outwards = self._polar(rays)
         across = self._scale(radius, angle)[..., None, None]
-        along = (self._angle_slope(angle) / (1 + radius * radius))[..., None, None]
+        along = (self._angle_derivative(angle) / (1 + radius * radius))[..., None, None]
         return across * np.eye(2) + (along - across) * outwards[..., :, None] * outwards[..., None, :]
 
     def _bent_by_terms(self, rays: Array) -> Array:

@@ -11,7 +11,7 @@ import numpy as np
 
 from worker.calibration.geometry.camera import Array, Camera
 from worker.calibration.geometry.field import Field, LinePoints
-from worker.calibration.geometry.lens import LENS_NUMBERS, Lens
+from worker.calibration.geometry.lens import LENS_PARAMETERS, Lens
 
 FIELD_STEP_M = 1e-3
 BOARD_FOCAL, BOARD_ASPECT, BOARD_RADIAL = 3e-4, 2e-4, 5e-4
@@ -52,9 +52,9 @@ class LensParameter:
 
     def changed(self, camera: Camera, by: float) -> Camera:
         """Return the camera with this parameter changed."""
-        numbers = lens_numbers(camera.intrinsics)
-        numbers[LENS_NUMBERS.index(self.name)] += by
-        return camera.with_lens(with_lens_numbers(camera.intrinsics, numbers))
+        numbers = lens_values(camera.intrinsics)
+        numbers[LENS_PARAMETERS.index(self.name)] += by
+        return camera.with_lens(with_lens_values(camera.intrinsics, numbers))
 
 
 @dataclass(frozen=True)
@@ -114,15 +114,15 @@ class FieldSkew(FieldParameter):
 Parameter = LensParameter | FieldParameter
 
 
-def lens_numbers(lens: Lens) -> Array:
-    """Return `LENS_NUMBERS` (6,) of a lens."""
+def lens_values(lens: Lens) -> Array:
+    """Return `LENS_PARAMETERS` (6,) of a lens."""
     (fx, _, cx), (_, fy, cy) = lens.matrix[:2].tolist()
     k1, k2 = (*lens.distortion.tolist(), 0.0, 0.0)[:2]
     return np.array([fx, cx, cy, fy / fx, k1, k2])
 
 
-def with_lens_numbers(lens: Lens, numbers: Array) -> Lens:
-    """Return the lens with other `LENS_NUMBERS` (6,)."""
+def with_lens_values(lens: Lens, numbers: Array) -> Lens:
+    """Return the lens with other `LENS_PARAMETERS` (6,)."""
     fx, cx, cy, aspect, k1, k2 = numbers.tolist()
     matrix = np.array([[fx, lens.matrix[0, 1], cx], [0.0, aspect * fx, cy], [0.0, 0.0, 1.0]])
     distortion = lens.distortion
@@ -132,8 +132,8 @@ def with_lens_numbers(lens: Lens, numbers: Array) -> Lens:
 
 
 def with_lens_changed(camera: Camera, changes: Array) -> Camera:
-    """Return the camera with `LENS_NUMBERS` changed by (6,)."""
-    return camera.with_lens(with_lens_numbers(camera.intrinsics, lens_numbers(camera.intrinsics) + changes))
+    """Return the camera with `LENS_PARAMETERS` changed by (6,)."""
+    return camera.with_lens(with_lens_values(camera.intrinsics, lens_values(camera.intrinsics) + changes))
 
 
 def lens_parameters(cameras: Sequence[Camera]) -> list[LensParameter]:
@@ -163,7 +163,7 @@ def lens_parameters_without_heat(cameras: Sequence[Camera]) -> list[LensParamete
             "k1": known.get("k1", BOARD_RADIAL),
             "k2": known.get("k2", BOARD_RADIAL),
         }
-        found += [LensParameter(number, name, expected[name]) for name in LENS_NUMBERS]
+        found += [LensParameter(number, name, expected[name]) for name in LENS_PARAMETERS]
     return found
 
 
@@ -219,7 +219,7 @@ def _known(pitch: Field) -> dict[str, float]:
 
 def with_focal_length(camera: Camera, longer_px: float) -> Camera:
     """Return the camera with its focal length increased by `longer_px`."""
-    return with_lens_changed(camera, longer_px * np.eye(len(LENS_NUMBERS))[0])
+    return with_lens_changed(camera, longer_px * np.eye(len(LENS_PARAMETERS))[0])
 
 
 def free_focal_lengths(cameras: Sequence[Camera]) -> list[LensParameter]:

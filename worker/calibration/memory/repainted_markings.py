@@ -18,7 +18,7 @@ from worker.calibration.detection.line_measurement import NOISE_PX, Measurements
 from worker.calibration.geometry.arrays import Array
 from worker.calibration.geometry.derivatives import POSE_NUMBERS
 from worker.calibration.geometry.field import LinePoints
-from worker.calibration.geometry.lens import LENS_NUMBERS
+from worker.calibration.geometry.lens import LENS_PARAMETERS
 from worker.calibration.memory.camera_memory import WIND, CameraMemory
 from worker.calibration.memory.epoch import SAME_VIEW_PX, Epoch
 from worker.calibration.robust import HUBER, robust_scale
@@ -61,13 +61,13 @@ def find_repainted_markings(memory: CameraMemory, measured: Measurements, lines:
 class _Differences:
     """Differences (M,) px between tonight's lines and those of an epoch, seen from the epoch's camera.
 
-    `marking` (M,); `slopes` (M, 6) of the offset, px per rad and metre of the pose; `longer` (M,) px when the focal
+    `marking` (M,); `jacobian` (M, 6) of the offset, px per rad and metre of the pose; `longer` (M,) px when the focal
     length doubles; `across` (M,) px per metre.
     """
 
     offset: Array
     marking: NDArray[np.intp]
-    slopes: Array
+    jacobian: Array
     longer: Array
     across: Array
 
@@ -77,12 +77,12 @@ class _Differences:
         index, tonight, before = np.intersect1d(measured.index, last.index, return_indices=True)
         measured, camera, positions = measured[tonight], last.camera, lines.position[index]
         offset = measured.offset(camera, positions) - last.offset[before]
-        slopes = measured.slopes(camera, positions)
-        focal = measured.lens_slopes(camera, positions)[:, LENS_NUMBERS.index("focal_length_px")]
-        known = np.isfinite(offset) & np.isfinite(slopes).all(axis=1) & np.isfinite(focal)
+        jacobian = measured.jacobian(camera, positions)
+        focal = measured.lens_jacobian(camera, positions)[:, LENS_PARAMETERS.index("focal_length_px")]
+        known = np.isfinite(offset) & np.isfinite(jacobian).all(axis=1) & np.isfinite(focal)
         longer = focal * camera.intrinsics.focal_length_px
         return cls(
-            offset[known], lines.marking[index][known], slopes[known], longer[known], measured.px_per_metre[known]
+            offset[known], lines.marking[index][known], jacobian[known], longer[known], measured.px_per_metre[known]
         )
 
     @property
@@ -93,7 +93,7 @@ class _Differences:
     def explained_by(self, candidates: NDArray[np.intp]) -> dict[int, float]:
         """Return the markings that have moved, and by how many metres, where camera and focal length may have
         changed as well."""
-        open_to: dict[int | str, Array] = {"zoomed": self.longer[:, None], "touched": self.slopes}
+        open_to: dict[int | str, Array] = {"zoomed": self.longer[:, None], "touched": self.jacobian}
         for marking in candidates.tolist():
             open_to[marking] = (self.across * (self.marking == marking))[:, None]
         sigma_px = self._sigma_px(list(open_to.values()))
@@ -115,12 +115,12 @@ class _Differences:
         more."""
         usual = float(np.hypot(NOISE_PX, NOISE_PX))
         _, change = self._fitted(columns, usual)
-        return usual * robust_scale((self.offset + np.concatenate([self.slopes, *columns], axis=1) @ change) / usual)
+        return usual * robust_scale((self.offset + np.concatenate([self.jacobian, *columns], axis=1) @ change) / usual)
 
     def _fitted(self, columns: Sequence[Array], sigma_px: float) -> tuple[float, Array]:
         """Return Huber's loss and the change (6 + n,) of the pose, by wind, and of `columns` (M, n) in all that
         minimises it."""
-        jacobian = np.concatenate([self.slopes, *columns], axis=1) / sigma_px
+        jacobian = np.concatenate([self.jacobian, *columns], axis=1) / sigma_px
         known = np.eye(POSE_NUMBERS, jacobian.shape[1]) / WIND[:, None]
         scale = np.maximum(np.linalg.norm(jacobian, axis=0), TINY)
         offset, weight = self.offset / sigma_px, np.ones(len(self.offset))

@@ -9,7 +9,7 @@ from math import comb
 import numpy as np
 
 from worker.calibration.geometry.camera import Array, Camera, inside
-from worker.calibration.geometry.derivatives import POSE_NUMBERS, pixel_slopes
+from worker.calibration.geometry.derivatives import POSE_NUMBERS, pixel_jacobian
 from worker.calibration.geometry.plausible_pose import FARTHEST_M, HIGHEST_M
 from worker.calibration.onboarding.clicks import FEWEST_CLICKS, Clicks
 from worker.calibration.onboarding.exchanged_labels import with_other_labels
@@ -196,8 +196,8 @@ def _what_to_add(best: PointFit, landmarks: Mapping[str, Array]) -> str:
 
 def sigma_px(found: PointFit, points: Array) -> Array:
     """Return one standard deviation (N,) px of points (N, 3) in the picture, by the pose alone."""
-    slopes = pixel_slopes(found.camera, points)
-    spread = np.einsum("nai,ij,naj->n", slopes, found.covariance[:POSE_NUMBERS, :POSE_NUMBERS], slopes)
+    jacobian = pixel_jacobian(found.camera, points)
+    spread = np.einsum("nai,ij,naj->n", jacobian, found.covariance[:POSE_NUMBERS, :POSE_NUMBERS], jacobian)
     return np.sqrt(np.nan_to_num(np.maximum(spread, 0.0), nan=0.0))
 
 

@@ -21,11 +21,11 @@ from worker.calibration.geometry.lens import Lens, LensModel
 from worker.calibration.onboarding.boards import BoardDetection
 from worker.calibration.onboarding.lens_fit import (
     LADDERS,
-    NUMBERS,
+    PARAMETERS,
     LensFit,
     Rung,
     fit_lens,
-    numbers_of,
+    parameter_values,
     predicted_rms_px,
     residuals_px,
     rms,
@@ -235,9 +235,9 @@ def _try(detections: Sequence[BoardDetection], size: tuple[int, int], model: Len
         out = [i for i in range(len(detections)) if i % count == fold]
         without = fit_lens([s for i, s in enumerate(detections) if i not in out], size, model, rung)
         left_out[out] = [predicted_rms_px(without.lens, detections[i]) for i in out]
-        numbers.append(numbers_of(without.lens))
+        numbers.append(parameter_values(without.lens))
     parts = np.stack(numbers)
-    fx, fy = (parts[:, NUMBERS[model].index(name)] for name in ("fx", "fy"))
+    fx, fy = (parts[:, PARAMETERS[model].index(name)] for name in ("fx", "fy"))
     spread, (aspect_spread,) = _jackknife(parts), _jackknife((fy / fx)[:, None])
     return _Tried(rung, fit_lens(detections, size, model, rung), left_out, spread, float(aspect_spread))
 
@@ -321,7 +321,7 @@ def _verdicts(
 
 
 def _by_name(values: Array, rung: Rung, lens: Lens) -> dict[str, float]:
-    known = dict(zip(NUMBERS[lens.model], values.tolist(), strict=True))
+    known = dict(zip(PARAMETERS[lens.model], values.tolist(), strict=True))
     # One focal length: OpenCV keeps the ratio and gives the deviation of fy alone.
     known["f"] = max(known["fx"], known["fy"])
     return {term: known[term] for term in rung.terms}

@@ -50,7 +50,7 @@ LADDERS: Mapping[LensModel, Sequence[Rung]] = {
 }
 """Lens models from the simplest to the richest. Sensors have square pixels; a picture stretched by a converter has
 not."""
-NUMBERS: Mapping[LensModel, tuple[str, ...]] = {
+PARAMETERS: Mapping[LensModel, tuple[str, ...]] = {
     "opencv": ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"),
     "fisheye": ("fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4"),
 }
@@ -58,7 +58,7 @@ NUMBERS: Mapping[LensModel, tuple[str, ...]] = {
 
 @dataclass(frozen=True)
 class LensFit:
-    """Result of OpenCV: the board's place in each photo, `sigma` (K,) in the order of `NUMBERS`, rms `by_photo`."""
+    """Result of OpenCV: the board's place in each photo, `sigma` (K,) in the order of `PARAMETERS`, rms `by_photo`."""
 
     lens: Lens
     turns: Sequence[Array]
@@ -82,7 +82,7 @@ def _fit_pinhole(
         world, pixel, size, guess, np.zeros(8 if rung.flags & cv2.CALIB_RATIONAL_MODEL else 5), flags=rung.flags
     )
     lens = LENSES["opencv"](_floats(matrix), _floats(distortion).ravel(), size)
-    numbers = _floats(sigma).ravel()[: len(NUMBERS["opencv"])]
+    numbers = _floats(sigma).ravel()[: len(PARAMETERS["opencv"])]
     return LensFit(lens, _vectors(turns), _vectors(shifts), numbers, _floats(by_photo).ravel())
 
 
@@ -111,14 +111,14 @@ def _fisheye_sigma(
 ) -> Array:
     """Return for a fisheye the deviations that `calibrateCameraExtended` gives for a pinhole: the boards' places are
     eliminated from the normal matrix (Schur)."""
-    names = NUMBERS["fisheye"]
+    names = PARAMETERS["fisheye"]
     free = np.array([name in rung.terms for name in names])
     information = np.zeros((int(free.sum()), int(free.sum())))
     for turn, shift, corners in zip(turns, shifts, world, strict=True):
-        _, jacobian = cv2.fisheye.projectPoints(corners[None], turn, shift, lens.matrix, lens.distortion)
+        _, found = cv2.fisheye.projectPoints(corners[None], turn, shift, lens.matrix, lens.distortion)
         # Its columns: fx fy cx cy k1 to k4, the turn, the shift, the skew.
-        slopes = _floats(jacobian)
-        a, b = slopes[:, :8][:, free], slopes[:, 8:14]
+        jacobian = _floats(found)
+        a, b = jacobian[:, :8][:, free], jacobian[:, 8:14]
         information += a.T @ a - a.T @ b @ np.linalg.solve(b.T @ b, b.T @ a)
     spare = max(off.size - int(free.sum()) - 6 * len(world), 1)
     variance = np.diag(np.linalg.pinv(information, hermitian=True)) * np.sum(off**2) / spare
@@ -156,9 +156,9 @@ def _vectors(columns: Any) -> list[Array]:
     return [_floats(column).ravel() for column in columns]
 
 
-def numbers_of(lens: Lens) -> Array:
-    """Return the parameters of a lens, in the order of `NUMBERS`."""
-    terms = lens.coefficients[: len(NUMBERS[lens.model]) - 4]
+def parameter_values(lens: Lens) -> Array:
+    """Return the parameters of a lens, in the order of `PARAMETERS`."""
+    terms = lens.coefficients[: len(PARAMETERS[lens.model]) - 4]
     return np.array([lens.matrix[0, 0], lens.matrix[1, 1], lens.matrix[0, 2], lens.matrix[1, 2], *terms])
 
 

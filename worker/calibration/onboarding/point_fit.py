@@ -15,22 +15,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from worker.calibration.geometry.camera import Array, Camera
-from worker.calibration.geometry.derivatives import POSE_NUMBERS, lens_slopes, moved, pixel_slopes
-from worker.calibration.geometry.lens import LENS_NUMBERS, Lens
+from worker.calibration.geometry.derivatives import POSE_NUMBERS, lens_jacobian, moved, pixel_jacobian
+from worker.calibration.geometry.lens import LENS_PARAMETERS, Lens
 from worker.calibration.onboarding.clicks import Clicks
 
 CLICK_PX = 2.0
 """Standard deviation of a click, in pixels of a 4K frame."""
 CLICK_EVIDENCE = 4.0
 """Weight of `CLICK_PX` in the estimate of a click's deviation, in coordinates."""
-FREE_NUMBERS = {
+FREE_PARAMETERS = {
     "focal length": "focal_length_px",
     "centre x": "principal_point_x_px",
     "centre y": "principal_point_y_px",
     "k1": "k1",
     "k2": "k2",
 }
-"""Parameters of `LENS_NUMBERS` that clicks may set free, by their names in a fit, where the focal length is its
+"""Parameters of `LENS_PARAMETERS` that clicks may set free, by their names in a fit, where the focal length is its
 logarithm."""
 LEAST_NOISE_PX = (16.0, 8.0, 4.0, CLICK_PX)
 """Least deviation of a click in the rounds before any click is believed or doubted, in pixels of a 4K frame: a start
@@ -105,7 +105,7 @@ def anywhere_cost(size: tuple[int, int]) -> float:
 
 def fit(clicks: Clicks, start: Camera, free: tuple[str, ...] = ()) -> PointFit:
     """Return the robust fit nearest to `start`: its pose, and the parameters of its lens that are `free`
-    (`FREE_NUMBERS`)."""
+    (`FREE_PARAMETERS`)."""
     problem = _Problem(clicks, start.intrinsics, free)
     camera, change = start, np.zeros(len(free))
     for least in LEAST_NOISE_PX:
@@ -144,8 +144,8 @@ class _Problem:
     def __init__(self, clicks: Clicks, lens: Lens, free: tuple[str, ...]) -> None:
         self.clicks = clicks
         self.lens = lens
-        self.index = [list(FREE_NUMBERS).index(name) for name in free]
-        self.columns = [LENS_NUMBERS.index(FREE_NUMBERS[name]) for name in free]
+        self.index = [list(FREE_PARAMETERS).index(name) for name in free]
+        self.columns = [LENS_PARAMETERS.index(FREE_PARAMETERS[name]) for name in free]
         # Expected errors of a lens that was measured badly; they keep what the clicks do not tell from running away.
         everything = np.array([0.2, 0.1 * lens.size[0], 0.1 * lens.size[0], 0.3, 0.3])
         self.information = np.concatenate([np.zeros(POSE_NUMBERS), everything[self.index] ** -2])
@@ -211,7 +211,7 @@ class _Problem:
 
     def _lens(self, change: Array) -> Lens:
         """Return the lens with its free parameters changed."""
-        by = np.zeros(len(FREE_NUMBERS))
+        by = np.zeros(len(FREE_PARAMETERS))
         by[self.index] = change
         matrix = self.lens.matrix.copy()
         matrix[[0, 1], [0, 1]] *= np.exp(np.clip(by[0], -2, 2))
@@ -239,6 +239,6 @@ class _Problem:
 
     def _jacobian(self, camera: Camera) -> Array:
         """Jacobian (N, 2, 6 + L) of the pixels by pose and free parameters."""
-        by_lens = lens_slopes(camera, self.clicks.world)
+        by_lens = lens_jacobian(camera, self.clicks.world)
         by_lens[..., 0] *= camera.intrinsics.focal_length_px
-        return np.concatenate([pixel_slopes(camera, self.clicks.world), by_lens[..., self.columns]], axis=-1)
+        return np.concatenate([pixel_jacobian(camera, self.clicks.world), by_lens[..., self.columns]], axis=-1)

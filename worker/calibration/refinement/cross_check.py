@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from worker.calibration.detection.line_measurement import Measurements
 from worker.calibration.geometry.camera import Array, Camera
-from worker.calibration.geometry.derivatives import POSE_NUMBERS, ground_slopes_of_all
+from worker.calibration.geometry.derivatives import POSE_NUMBERS, full_ground_jacobian
 from worker.calibration.geometry.far_marking import farthest_marking
 from worker.calibration.geometry.field import Field
 from worker.calibration.refinement.estimate import Estimate
@@ -91,11 +91,11 @@ class CrossChecks:
 
 
 def cross_check(pitch: Field, camera: Camera, difference: Array, covariance: Array) -> CrossCheck | None:
-    """Propagate a `difference` (12,) of pose and `LENS_NUMBERS`, of this covariance (12, 12), to the farthest
+    """Propagate a `difference` (12,) of pose and `LENS_PARAMETERS`, of this covariance (12, 12), to the farthest
     marking."""
-    slopes = ground_slopes_of_all(camera, farthest_marking(pitch, camera))
-    apart = np.linalg.norm(slopes @ difference, axis=-1)
-    variance = np.einsum("nij,jk,nik->n", slopes, covariance, slopes)
+    jacobian = full_ground_jacobian(camera, farthest_marking(pitch, camera))
+    apart = np.linalg.norm(jacobian @ difference, axis=-1)
+    variance = np.einsum("nij,jk,nik->n", jacobian, covariance, jacobian)
     known = np.isfinite(apart) & np.isfinite(variance)
     if not known.any():
         return None

@@ -14,8 +14,8 @@ import numpy as np
 from worker.calibration.detection.line_measurement import Measurements
 from worker.calibration.geometry.camera import Array
 from worker.calibration.geometry.derivatives import POSE_NUMBERS
-from worker.calibration.geometry.lens import LENS_NUMBERS
-from worker.calibration.geometry.parameters import LensParameter, lens_numbers
+from worker.calibration.geometry.lens import LENS_PARAMETERS
+from worker.calibration.geometry.parameters import LensParameter, lens_values
 from worker.calibration.memory.camera_memory import CameraMemory
 from worker.calibration.refinement.estimate import Estimate
 from worker.calibration.refinement.least_squares import (
@@ -26,7 +26,7 @@ from worker.calibration.refinement.least_squares import (
     weigh_rows,
 )
 from worker.calibration.refinement.unknowns import Unknowns
-from worker.calibration.robust import tukey_slopes, tukey_weights
+from worker.calibration.robust import tukey_derivatives, tukey_weights
 
 LEAST_HELD, TINY = 1e-9, 1e-300
 """Relative eigenvalue of the information below which a direction is taken to be unknown."""
@@ -65,7 +65,7 @@ class Sandwich:
         """Sum up rows on a ground of `heights` (K,)."""
         flat = weigh_rows(rows, heights, unknowns, tukey_weights)
         equations = normal_equations(flat)
-        steep = normal_equations(weigh_rows(rows, heights, unknowns, tukey_slopes))
+        steep = normal_equations(weigh_rows(rows, heights, unknowns, tukey_derivatives))
         return cls(steep.information, equations.gradient, error_of_measurement(flat, equations.information))
 
     def covariance_of_poses(self, here: Estimate) -> Array:
@@ -139,7 +139,7 @@ def _remembered(here: Estimate, memories: Sequence[CameraMemory | None], unknown
             if camera.ignored is not None:
                 its = its[camera.sees(its.pixel)]
             # An epoch has the lens of its time: what that differs by from tonight's is no error.
-            differs = lens_numbers(camera.intrinsics) - lens_numbers(epoch.camera.intrinsics)
+            differs = lens_values(camera.intrinsics) - lens_values(epoch.camera.intrinsics)
             if len(its) >= FEWEST_MEASUREMENTS:
                 made = Rows.of(here.lines.position, epoch.camera, view, its, unknowns)
                 rows.append(replace(made, offset=made.offset + _by_lens(made, unknowns, view, differs)))
@@ -148,12 +148,12 @@ def _remembered(here: Estimate, memories: Sequence[CameraMemory | None], unknown
 
 
 def _by_lens(rows: Rows, unknowns: Unknowns, view: int, differs: Array) -> Array:
-    """Return the change (M,) px of a view's offsets when `LENS_NUMBERS` (6,) of its lens change by `differs`."""
+    """Return the change (M,) px of a view's offsets when `LENS_PARAMETERS` (6,) of its lens change by `differs`."""
     changed = np.zeros(len(rows.offset))
     owner = unknowns.lenses[view][0] if unknowns.lenses else view
     for column, (_, parameter) in enumerate(unknowns.parameters_of(view), POSE_NUMBERS):
         if isinstance(parameter, LensParameter) and parameter.camera == owner:
-            changed += rows.jacobian[:, column] * differs[LENS_NUMBERS.index(parameter.name)]
+            changed += rows.jacobian[:, column] * differs[LENS_PARAMETERS.index(parameter.name)]
     return changed
 
 

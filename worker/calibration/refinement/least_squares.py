@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from worker.calibration.detection.line_measurement import PAINT_M, Measurements
 from worker.calibration.geometry.camera import Array, Camera
 from worker.calibration.geometry.ground import Ground
-from worker.calibration.geometry.lens import LENS_NUMBERS
+from worker.calibration.geometry.lens import LENS_PARAMETERS
 from worker.calibration.geometry.parameters import FieldParameter, LensParameter, Parameter
 from worker.calibration.refinement.unknowns import Unknowns
 from worker.calibration.robust import USUAL, Weigh, tukey_weights
@@ -71,7 +71,7 @@ class Rows:
         here = positions[measured.index]
         parameters = unknowns.parameters_of(view)
         columns = np.array([*range(*unknowns.pose(view).indices(len(unknowns))), *(n for n, _ in parameters)], np.intp)
-        by_pose = measured.slopes(camera, here)
+        by_pose = measured.jacobian(camera, here)
         by_parameters = _by_parameters(by_pose, here, camera, measured, [parameter for _, parameter in parameters])
         jacobian = np.concatenate([by_pose, by_parameters], axis=1)
         offset = measured.offset(camera, here)
@@ -97,15 +97,15 @@ def _by_parameters(
 
     `by_pose` (M, 6): that by the pose.
     """
-    slopes = np.empty((len(measured), len(parameters)))
-    lens = {at: LENS_NUMBERS.index(p.name) for at, p in enumerate(parameters) if isinstance(p, LensParameter)}
+    jacobian = np.empty((len(measured), len(parameters)))
+    lens = {at: LENS_PARAMETERS.index(p.name) for at, p in enumerate(parameters) if isinstance(p, LensParameter)}
     if lens:
-        slopes[:, list(lens)] = measured.lens_slopes(camera, points)[:, list(lens.values())]
+        jacobian[:, list(lens)] = measured.lens_jacobian(camera, points)[:, list(lens.values())]
     for at, parameter in enumerate(parameters):
         if isinstance(parameter, FieldParameter):
             # A point that moves is a camera that moves the other way.
-            slopes[:, at] = -np.sum(by_pose[:, 3:] * parameter.shift[measured.index], axis=1)
-    return slopes
+            jacobian[:, at] = -np.sum(by_pose[:, 3:] * parameter.shift[measured.index], axis=1)
+    return jacobian
 
 
 def rows_of(
@@ -299,8 +299,8 @@ def _pulls(of: WeightedRows) -> Array:
     cluster, pull = cluster_of[of.at], of.weight * of.left
     found = np.zeros((count, len(unknowns)))
     for rows, part in zip(of.rows, of.parts(), strict=True):
-        for column, slopes in zip(rows.columns, rows.jacobian.T, strict=True):
-            found[:, column] += _summed(cluster[part], slopes * pull[part], count)
+        for column, jacobian in zip(rows.columns, rows.jacobian.T, strict=True):
+            found[:, column] += _summed(cluster[part], jacobian * pull[part], count)
     node, share = ground.node[of.points], ground.share[of.points]
     risen = -_summed(of.at, of.up * pull, len(of.points))
     pair = cluster_of[:, None] * size + node

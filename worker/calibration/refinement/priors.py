@@ -18,15 +18,15 @@ from numpy.typing import NDArray
 
 from worker.calibration.geometry.camera import Array, Camera
 from worker.calibration.geometry.derivatives import POSE_NUMBERS, change_between
-from worker.calibration.geometry.lens import LENS_NUMBERS
+from worker.calibration.geometry.lens import LENS_PARAMETERS
 from worker.calibration.geometry.parameters import (
     HEAT_FOCAL,
     FieldParameter,
     LensParameter,
     Parameter,
     field_parameters,
-    lens_numbers,
     lens_parameters_without_heat,
+    lens_values,
 )
 from worker.calibration.memory.camera_memory import WIND, CameraMemory
 from worker.calibration.refinement.estimate import PRIOR_M, PRIOR_RAD, Estimate
@@ -89,11 +89,11 @@ class Priors:
     def lens_tonight(self, number: int) -> Array:
         """Return the rows (6, A) of the mixing for the lens parameters of camera `number` tonight."""
         first = POSE_NUMBERS * self.unknowns.views
-        rows = np.zeros((len(LENS_NUMBERS), self.mixing.shape[1]))
+        rows = np.zeros((len(LENS_PARAMETERS), self.mixing.shape[1]))
         tonight = {number, _heat_number(self.unknowns.views, number)}
         for at, parameter in enumerate(self.unknowns.parameters, first):
             if isinstance(parameter, LensParameter) and parameter.camera in tonight:
-                rows[LENS_NUMBERS.index(parameter.name)] += self.mixing[at]
+                rows[LENS_PARAMETERS.index(parameter.name)] += self.mixing[at]
         return rows
 
 
@@ -175,7 +175,7 @@ class _Errors:
     def add_camera(self, number: int, before: Camera) -> None:
         """Add a camera without a memory: moved or zoomed since it was stored as `before`, through its lens."""
         camera = self._cameras[number]
-        self._blocks.append(self._lens(number, lens_numbers(before.intrinsics) - lens_numbers(camera.intrinsics)))
+        self._blocks.append(self._lens(number, lens_values(before.intrinsics) - lens_values(camera.intrinsics)))
         moved = self._move([number], MOVED, MOVEMENT_SCALES, self._from_stored(number, before))
         self._blocks.append([moved, self._heat([number], FOCAL_SCALES if self._has_fixed_focal(number) else ONCE)])
 
@@ -185,7 +185,7 @@ class _Errors:
         tonight, anchor, *others = (view for view, owner in enumerate(self._owner_of) if owner == number)
         recent, earlier = (others[:1], others[1:]) if memory.recent else ([], others)
 
-        told = lens_numbers(memory.origin.intrinsics) - lens_numbers(camera.intrinsics)
+        told = lens_values(memory.origin.intrinsics) - lens_values(camera.intrinsics)
         self._blocks.append(self._lens(number, told))
         from_origin = self._from_stored(number, memory.origin)
         self._blocks.append([self._move([tonight, anchor, *others], MOVED, MOVEMENT_SCALES, from_origin)])
@@ -234,12 +234,12 @@ class _Errors:
         for names, scales, odds in (
             ({"focal_length_px"}, FOCAL_SCALES, STATED_ODDS if is_stated else UNSTATED_ODDS),
             ({"aspect"}, FOCAL_SCALES, STATED_ODDS),
-            (set(LENS_NUMBERS) - {"focal_length_px", "aspect"}, LENS_SCALES, None),
+            (set(LENS_PARAMETERS) - {"focal_length_px", "aspect"}, LENS_SCALES, None),
         ):
             its = [p for p in known if p.name in names]
             if its:
                 columns = np.eye(self._unknowns.dense)[:, [self._places[number, p.name] for p in its]]
-                means = np.array([mean[LENS_NUMBERS.index(p.name)] for p in its])
+                means = np.array([mean[LENS_PARAMETERS.index(p.name)] for p in its])
                 group = self._group(columns, np.array([p.expected for p in its]), means, scales)
                 groups.append(self.add_lasting(replace(group, odds=odds)))
         return groups

@@ -19,9 +19,9 @@ from fields.template import TURF_M
 from worker.calibration.detection.evidence import Evidence
 from worker.calibration.detection.line_measurement import Measurements
 from worker.calibration.geometry.camera import Array, Camera
-from worker.calibration.geometry.derivatives import POSE_NUMBERS, moved, pixel_slopes_of_all
+from worker.calibration.geometry.derivatives import POSE_NUMBERS, full_pixel_jacobian, moved
 from worker.calibration.geometry.field import Field
-from worker.calibration.geometry.lens import LENS_NUMBERS
+from worker.calibration.geometry.lens import LENS_PARAMETERS
 from worker.calibration.geometry.parameters import (
     HEAT_FOCAL,
     LensParameter,
@@ -121,7 +121,7 @@ class GroundSigma:
 class PoseAndLens:
     """Pose and lens of a camera as the lines have both, for measuring in the world.
 
-    `covariance` (12, 12): of the rotation in the camera's frame (rad), the position (m) and `LENS_NUMBERS`.
+    `covariance` (12, 12): of the rotation in the camera's frame (rad), the position (m) and `LENS_PARAMETERS`.
     """
 
     camera: Camera
@@ -364,7 +364,7 @@ class _Judgement:
         """
         off = next((d for d in self._of_lens(number, solved) if d.name == FOCAL), None)
         since = self._since_stored()
-        row = self.believed.lens_tonight(number)[LENS_NUMBERS.index(FOCAL)]
+        row = self.believed.lens_tonight(number)[LENS_PARAMETERS.index(FOCAL)]
         longer_px = float(row @ since)
         if off is None or abs(off.value) <= abs(longer_px):
             return off, self.value
@@ -382,16 +382,16 @@ class _Judgement:
         if len(index) == 0:
             return None
         index = index[:: max(len(index) // ASKED_MARKINGS, 1)]
-        slopes = pixel_slopes_of_all(camera, self.here.lines.position[index])
-        by_ground, all_of_it = -slopes[..., 3:6], both
+        jacobian = full_pixel_jacobian(camera, self.here.lines.position[index])
+        by_ground, all_of_it = -jacobian[..., 3:6], both
         for at, parameter in enumerate(self.believed.unknowns.parameters, POSE_NUMBERS * self.believed.unknowns.views):
             if not isinstance(parameter, LensParameter):
-                slopes = np.concatenate([slopes, by_ground @ parameter.shift[index][..., None]], axis=-1)
+                jacobian = np.concatenate([jacobian, by_ground @ parameter.shift[index][..., None]], axis=-1)
                 all_of_it = np.concatenate([all_of_it, self.believed.mixing[at : at + 1]])
         inverse = np.linalg.pinv(by_ground[..., :2])
         metres = pixels = np.zeros(len(index))
         for covariance in (self.by_lines, self.covariance):
-            in_picture = slopes @ (all_of_it @ covariance @ all_of_it.T) @ slopes.transpose(0, 2, 1)
+            in_picture = jacobian @ (all_of_it @ covariance @ all_of_it.T) @ jacobian.transpose(0, 2, 1)
             on_ground = inverse @ in_picture @ inverse.transpose(0, 2, 1)
             metres, pixels = np.maximum(metres, _sigmas(on_ground)), np.maximum(pixels, _sigmas(in_picture))
         return GroundSigma(metres, pixels)

@@ -63,15 +63,15 @@ def _stepped(field: FieldMap, view: LineView, cameras: Hypotheses, tolerance_px:
     radial = (seen * across).sum(axis=-1)
     # A known lens parameter has a Jacobian of 0, and so stays exactly as it is.
     of_lens = np.stack([radial * (lens.focal > 0), radial * outwards * (lens.bend > 0)], axis=-1)
-    slopes = np.concatenate([np.cross(ahead_of, push), push, of_lens], axis=-1)
+    jacobian = np.concatenate([np.cross(ahead_of, push), push, of_lens], axis=-1)
     reach = (depth * counted).sum(axis=1) / np.maximum(counted.sum(axis=1), 1)
     # Without counted points nothing is measured, and the step is none.
     reach = np.where(reach > 0, reach, 1.0)
     spread = np.empty((len(cameras), 8))
     spread[:, :3], spread[:, 3:6] = TURN_RAD, SHIFT * reach[:, None]
     spread[:, 6:] = lens.focal or 1.0, lens.bend or 1.0
-    weighted = slopes * weights[..., None]
-    information = np.swapaxes(slopes, 1, 2) @ weighted + np.eye(8) / spread[:, None] ** 2
+    weighted = jacobian * weights[..., None]
+    information = np.swapaxes(jacobian, 1, 2) @ weighted + np.eye(8) / spread[:, None] ** 2
     step = np.linalg.solve(information, np.einsum("pnk,pn->pk", weighted, off)[..., None])[..., 0]
     return _moved(cameras, step)
 

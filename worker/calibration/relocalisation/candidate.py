@@ -12,7 +12,7 @@ from worker.calibration.detection.evidence import Evidence
 from worker.calibration.diagnostics.overlap import Overlap, overlap_of
 from worker.calibration.diagnostics.registration import Response
 from worker.calibration.geometry.camera import Camera, inside
-from worker.calibration.geometry.derivatives import POSE_NUMBERS, pixel_slopes_of_all
+from worker.calibration.geometry.derivatives import POSE_NUMBERS, full_pixel_jacobian
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.lens import SIGMA_NAMES
 from worker.calibration.geometry.parameters import LensParameter, free_lens_sigma
@@ -144,6 +144,6 @@ def _shift_sigma_px(field: Field, found: RefinedPose) -> float | None:
     in_view = lines[inside(found.camera.project(lines), found.camera.intrinsics.size)]
     if found.refined is None or len(in_view) == 0:
         return None
-    slopes = pixel_slopes_of_all(found.camera, in_view)
-    variances = np.einsum("nij,jk,nik->n", slopes, found.refined.covariance, slopes)
+    jacobian = full_pixel_jacobian(found.camera, in_view)
+    variances = np.einsum("nij,jk,nik->n", jacobian, found.refined.covariance, jacobian)
     return float(np.sqrt(np.nanmean(variances)))

@@ -15,7 +15,7 @@ from worker.calibration.detection.contrast import Channels, PixelReader
 from worker.calibration.detection.line_matching import known_contrasts
 from worker.calibration.detection.line_measurement import LineProfiles
 from worker.calibration.geometry.camera import Array, Camera, Frame
-from worker.calibration.geometry.derivatives import POSE_NUMBERS, change_between, moved, pixel_slopes
+from worker.calibration.geometry.derivatives import POSE_NUMBERS, change_between, moved, pixel_jacobian
 from worker.calibration.geometry.field import Field, LinePoints
 from worker.calibration.geometry.visibility import VisibleLines
 from worker.calibration.refinement.least_squares import CLUSTER_POINTS
@@ -67,18 +67,20 @@ class LineObservations:
     """Pieces of line in one frame, M of them.
 
     `expected`: the camera they were looked for with; `piece` (M,): which of them; `offset` (M,) px: of each from where
-    that camera expects it, and `slope` (M, 6): Jacobian of that expectation by its pose; `share`: of those that were
+    that camera expects it, and `jacobian` (M, 6): Jacobian of that expectation by its pose; `share`: of those that were
     looked for.
     """
 
     expected: Camera
     piece: NDArray[np.intp]
     offset: Array
-    slope: Array
+    jacobian: Array
     share: float
 
     def __getitem__(self, chosen: NDArray[np.bool_]) -> LineObservations:
-        return LineObservations(self.expected, self.piece[chosen], self.offset[chosen], self.slope[chosen], self.share)
+        return LineObservations(
+            self.expected, self.piece[chosen], self.offset[chosen], self.jacobian[chosen], self.share
+        )
 
 
 @dataclass(frozen=True)
@@ -201,28 +203,28 @@ class TrackedLines:
         found = read.profiles.measure(expected, read.lines, search_px * self._scale)
         points = found.points.position
         offset = np.sum((found.pixel - expected.project(points)) * found.normal, axis=1)
-        slope = np.einsum("mij,mi->mj", pixel_slopes(expected, points), found.normal)
-        good = np.isfinite(offset) & np.isfinite(slope).all(axis=1)
+        jacobian = np.einsum("mij,mi->mj", pixel_jacobian(expected, points), found.normal)
+        good = np.isfinite(offset) & np.isfinite(jacobian).all(axis=1)
         share = good.sum() / len(read.pieces)
         if good.sum() < FEWEST_PIECES or share < FEWEST_SHARE * self._usual:
             return None
-        seen = LineObservations(expected, read.pieces[found.index[good]], offset[good], slope[good], share)
+        seen = LineObservations(expected, read.pieces[found.index[good]], offset[good], jacobian[good], share)
         return self.explained(seen)
 
     def _telling(self) -> NDArray[np.intp]:
         """Return the few pieces that are looked at: of those that are seen at least half as often as others."""
         often = np.flatnonzero(self._beside.are_seen_as_often(OFTEN))
         seen = VisibleLines.from_camera(self._pieces[often], self.reference)
-        slopes = np.einsum("mij,mi->mj", pixel_slopes(self.reference, seen.points.position), seen.normal) / NOISE_PX
-        usable = np.flatnonzero(np.isfinite(slopes).all(axis=1))
+        jacobian = np.einsum("mij,mi->mj", pixel_jacobian(self.reference, seen.points.position), seen.normal) / NOISE_PX
+        usable = np.flatnonzero(np.isfinite(jacobian).all(axis=1))
         pieces = often[seen.index[usable]]
-        return pieces[most_telling(slopes[usable], self._patch[pieces], PRIOR, FEW)]
+        return pieces[most_telling(jacobian[usable], self._patch[pieces], PRIOR, FEW)]
 
     def explained(self, every: LineObservations) -> Sighting:
         """Return the observation of the pose by pieces: robust least squares, with the errors that a patch shares."""
         seen = self._known(every)
         sigma = self._sigma(seen)
-        rows, values = seen.slope / sigma[:, None], (seen.offset - self._beside.mean[seen.piece]) / sigma
+        rows, values = seen.jacobian / sigma[:, None], (seen.offset - self._beside.mean[seen.piece]) / sigma
         change = np.zeros(POSE_NUMBERS)
         for weigh in (*STEPS * [huber_weights], *STEPS * [tukey_weights]):
             weight = weigh(values - rows @ change)
@@ -251,7 +253,7 @@ class TrackedLines:
     def learn(self, sighting: Sighting, now: Camera) -> None:
         """Keep the offsets of the pieces from their places when the camera is where it is `now` known to be."""
         seen = sighting.seen
-        left = seen.offset - seen.slope @ change_between(seen.expected, now)
+        left = seen.offset - seen.jacobian @ change_between(seen.expected, now)
         counted = tukey_weights((left - self._beside.mean[seen.piece]) / self._sigma(seen)) > 0
         which = seen.piece[counted]
         novelty = NOVELTY if self._usual else 1.0
