@@ -64,14 +64,16 @@ class Evidence:
         """Share found beyond chance: 1 where all lines are found, 0 where no more than anywhere (Cohen, 1960)."""
         return (self.share - self.by_chance) / max(1.0 - self.by_chance, LEAST_ROOM)
 
-    def of(self, marking: int) -> Evidence:
+    def for_marking(self, marking: int) -> Evidence:
         """Return the evidence for one marking."""
         its = self.marking == marking
         return Evidence(self.index[its], self.marking[its], self.weight[its], self.found[its], self.chance[its])
 
     def seen(self) -> NDArray[np.intp]:
         """Return the markings that are found clearly more often than chance would: what else fits them is no line."""
-        return np.array([marking for marking in np.unique(self.marking) if self.of(marking).is_seen], dtype=np.intp)
+        return np.array(
+            [marking for marking in np.unique(self.marking) if self.for_marking(marking).is_seen], dtype=np.intp
+        )
 
     @property
     def is_seen(self) -> bool:
@@ -97,16 +99,16 @@ def evidence_of(
     `channels` of the frame; `response` (H, W) the segmentation in 0..1; `left_out` (H, W): where chance has no try.
     """
     scale = camera.intrinsics.relative_size
-    tolerance, beside = max(TOLERANCE_PX * scale, 2.0), max(CHANCE_REACH_PX * scale, 24.0)
+    tolerance, reach = max(TOLERANCE_PX * scale, 2.0), max(CHANCE_REACH_PX * scale, 24.0)
     seen = VisibleLines.from_camera(lines, camera)
     parts = []
-    for looked in match_lines(seen, channels, tolerance + beside, scale):
+    for looked in match_lines(seen, channels, tolerance + reach, scale):
         pieces = seen[looked.which]
         where = pieces.pixel[:, None] + looked.shifts[None, :, None] * pieces.normal[:, None]
         network = bilinear(response, where) / (MARKING * np.minimum(pieces.width_px, 1.0))[:, None]
         strength = np.maximum(looked.along / LEAST_ALONG, network)
         near = np.abs(looked.shifts) <= tolerance
-        away = np.abs(looked.shifts) > min(2 * tolerance + pieces.width_px.max(initial=0) / 2, beside)
+        away = np.abs(looked.shifts) > min(2 * tolerance + pieces.width_px.max(initial=0) / 2, reach)
         # As many shifts at a time as there are around the expected place, and all that there are beside a wide line.
         tries = min(int(near.sum()), int(away.sum()))
         hits = _any_of(strength[:, away] >= 1, tries)

@@ -72,7 +72,7 @@ class Matches:
     base: Array
     sampling_px: float
 
-    def signed(self, sign: int) -> Matches:
+    def with_polarity(self, sign: int) -> Matches:
         """Return the matches for lines that are brighter (1) or darker (-1) than their ground; other paint is not
         considered."""
         return self if sign == 1 else replace(self, correlation=-self.correlation, along=-self.along)
@@ -143,7 +143,7 @@ def match_known(
             if which.any():
                 rows = np.flatnonzero(which)
                 found = _matches_of(of_class, rows, picture, channel, seen, bend, reach_px, relative_size)
-                matches.append(found.signed(sign))
+                matches.append(found.with_polarity(sign))
     return matches
 
 

@@ -299,8 +299,8 @@ def _lost(sight: LinesInSight, ground: _Ground) -> Mask:
     believed = np.full((rows, columns), float(sight.found.mean()) if len(sight.found) else 0.0)
     for reach in (FAR_CELLS, NEAR_CELLS):
         here, there = (cv2.GaussianBlur(plane, (0, 0), reach) for plane in (expected, found))
-        held = PRIOR_PLACES / reach**2
-        believed = (there + held * believed) / (here + held)
+        prior = PRIOR_PLACES / reach**2
+        believed = (there + prior * believed) / (here + prior)
     return np.asarray(believed < LOST)
 
 

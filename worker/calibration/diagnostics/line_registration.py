@@ -69,13 +69,13 @@ def register_lines(pitch: Field, first: MeasuredLines, second: MeasuredLines) ->
         np.einsum("md,mdj->mj", points.normal[:, :2], forms), apart, sigma, lines.spacing, at_centre
     )
 
-    held = directions_in_common(pitch, first.camera, second.camera, centre)
+    expected_directions = directions_in_common(pitch, first.camera, second.camera, centre)
     variance, directions = np.linalg.eigh(at_centre @ covariance @ at_centre.T)
-    told = directions[:, variance < LOOSE_M**2][:, :held]
-    if told.shape[1] < held:
+    directions_held = directions[:, variance < LOOSE_M**2][:, :expected_directions]
+    if directions_held.shape[1] < expected_directions:
         return None
-    dx, dy = told @ told.T @ at_centre @ moves / PIXEL_M
-    return Registration(float(dx), float(dy), support_m, (first.camera.id, second.camera.id), centre, told)
+    dx, dy = directions_held @ directions_held.T @ at_centre @ moves / PIXEL_M
+    return Registration(float(dx), float(dy), support_m, (first.camera.id, second.camera.id), centre, directions_held)
 
 
 def _moves(jacobian: Array, apart: Array, sigma: Array, spacing_m: float, at_centre: Array) -> tuple[Array, Array]:

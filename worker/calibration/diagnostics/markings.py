@@ -96,23 +96,23 @@ def report_markings(
     names = pitch.whole_names()
     whole = {name: number for number, name in enumerate(dict.fromkeys(names))}
     group = np.array([whole[name] for name in names])
-    told = {}
+    offsets = {}
     if found.evidence.agreement >= LEAST_AGREEMENT:
-        told = _offsets(lines, group, found, _farther_away(lines, group, found, channels, response))
+        offsets = _offsets(lines, group, found, _farther_away(lines, group, found, channels, response))
     pieces = group[found.evidence.marking]
-    seen = []
+    reports = []
     for name, number in whole.items():
         its = pieces == number
         if not its.any():
             continue
         expected_m, share = float(its.sum() * lines.spacing), float(found.evidence.found[its].mean())
-        if number not in told:
-            seen.append(MarkingReport(name, expected_m, share))
+        if number not in offsets:
+            reports.append(MarkingReport(name, expected_m, share))
             continue
-        offset, sigma = told[number]
+        offset, sigma = offsets[number]
         direction, sign = direction_of(lines, np.flatnonzero(group[lines.marking] == number))
-        seen.append(MarkingReport(name, expected_m, share, sign * offset, sigma, direction))
-    return seen
+        reports.append(MarkingReport(name, expected_m, share, sign * offset, sigma, direction))
+    return reports
 
 
 def _farther_away(
@@ -162,29 +162,29 @@ def _offsets(
     means = measured.means()
     free: list[int] = []
     while True:
-        told = _told(means, free)
-        off = {n: abs(offset) / sigma for n, (offset, sigma) in told.items() if n not in free}
-        sure = {n: sigmas for n, sigmas in off.items() if sigmas > SURE and abs(told[n][0]) > LEAST_OFF_M}
-        if not sure or len(free) >= len(told) / 3:
+        offsets = _joint_offsets(means, free)
+        off = {n: abs(offset) / sigma for n, (offset, sigma) in offsets.items() if n not in free}
+        sure = {n: sigmas for n, sigmas in off.items() if sigmas > SURE and abs(offsets[n][0]) > LEAST_OFF_M}
+        if not sure or len(free) >= len(offsets) / 3:
             break
         free.append(max(sure, key=lambda n: sure[n]))
     worse = max(1.0, float(np.median(list(off.values()))) / HALF_ARE_NEARER) if off else 1.0
-    return {number: (offset, worse * sigma) for number, (offset, sigma) in told.items()}
+    return {number: (offset, worse * sigma) for number, (offset, sigma) in offsets.items()}
 
 
-def _told(means: _Means, free: Sequence[int]) -> dict[int, tuple[float, float]]:
+def _joint_offsets(means: _Means, free: Sequence[int]) -> dict[int, tuple[float, float]]:
     """Return offset and sigma of each group if it and the `free` ones may be elsewhere, and all others are in place."""
-    told = {}
+    offsets = {}
     for row, number in enumerate(means.group):
         rows = [row, *(means.group.index(other) for other in free if other != number)]
-        left = np.eye(len(rows)) - means.carried[np.ix_(rows, rows)]
-        if np.linalg.svd(left, compute_uv=False)[-1] < LEAST_FREE:
+        remaining = np.eye(len(rows)) - means.carried[np.ix_(rows, rows)]
+        if np.linalg.svd(remaining, compute_uv=False)[-1] < LEAST_FREE:
             continue
-        back = np.linalg.inv(left)[0]
+        back = np.linalg.inv(remaining)[0]
         offset = float(back @ means.mean[rows])
         of_means = float(np.sqrt(back**2 @ means.variance[rows]))
-        told[number] = offset, float(np.hypot(of_means, PUT_BACK_ERROR * (offset - means.mean[row])))
-    return told
+        offsets[number] = offset, float(np.hypot(of_means, PUT_BACK_ERROR * (offset - means.mean[row])))
+    return offsets
 
 
 def direction_of(lines: LinePoints, its: NDArray[np.intp]) -> tuple[Direction, float]:
@@ -270,16 +270,16 @@ class _Offsets:
         for number in numbers:
             its = self.group == number
             middle, weight = self._mean(its)
-            told = float(weight.sum())
-            pulls = _by_patch(self.patch[its], weight * (self.offset[its] / self.scale[its] - middle))
-            further = len(pulls) - 1
-            own = float(np.sum(pulls**2)) * (further + 1)
-            spread = (own + USUAL_COUNTS * usual * told) / (further + USUAL_COUNTS)
+            total = float(weight.sum())
+            by_patch = _by_patch(self.patch[its], weight * (self.offset[its] / self.scale[its] - middle))
+            further = len(by_patch) - 1
+            own = float(np.sum(by_patch**2)) * (further + 1)
+            spread = (own + USUAL_COUNTS * usual * total) / (further + USUAL_COUNTS)
             spread += LEAST_NOISE * float(np.sum(weight**2 * (self.sigma[its] / self.scale[its]) ** 2))
-            alike = weight @ self.alike[its] / told
+            alike = weight @ self.alike[its] / total
             mean.append(middle)
-            variance.append(spread / told**2 + float(alike @ alike))
-            says.append((weight / self.scale[its]) @ self.jacobian[its] / told)
+            variance.append(spread / total**2 + float(alike @ alike))
+            says.append((weight / self.scale[its]) @ self.jacobian[its] / total)
         moves = [self.gives[:, self.group == n] @ (self.scale / self.sigma)[self.group == n] for n in numbers]
         carried = np.array(says).reshape(-1, POSE_NUMBERS) @ np.array(moves).reshape(-1, POSE_NUMBERS).T
         return _Means(numbers, np.array(mean), np.array(variance), carried)
@@ -300,10 +300,10 @@ class _Offsets:
         for number in np.unique(self.group):
             its = self.group == number
             mean, weight = self._mean(its)
-            pulls = _by_patch(self.patch[its], weight * (self.offset[its] / self.scale[its] - mean))
-            told = _by_patch(self.patch[its], weight)
-            counted = told > 0
-            squares += float(np.sum(pulls[counted] ** 2 / told[counted]))
+            by_patch = _by_patch(self.patch[its], weight * (self.offset[its] / self.scale[its] - mean))
+            weights = _by_patch(self.patch[its], weight)
+            counted = weights > 0
+            squares += float(np.sum(by_patch[counted] ** 2 / weights[counted]))
             informed += int(counted.sum())
             spare += 1
         together = float(np.bincount(self.patch).max())

@@ -52,9 +52,9 @@ def overlap_of(pitch: Field, camera: Camera, response: NDArray[np.float32]) -> O
     beside_all = marked & _pitch_area(pitch, camera) & ~explained
     not_counted = left_out(pitch, camera)
     area_beside = int(np.count_nonzero(beside_all if not_counted is None else beside_all & ~not_counted))
-    beside = area_beside * found / area_explained if area_explained else float(area_beside)
+    unexpected_px = area_beside * found / area_explained if area_explained else float(area_beside)
     unexpected = area_beside / (area_beside + area_explained) if area_beside else 0.0
-    return Overlap(found / (expected + beside), found / expected, unexpected)
+    return Overlap(found / (expected + unexpected_px), found / expected, unexpected)
 
 
 def _strongest(response: NDArray[np.float32], distance: float) -> NDArray[np.float32]:

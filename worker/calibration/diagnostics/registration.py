@@ -77,7 +77,7 @@ class Registration:
 
     Where the common markings are all parallel, only the displacement across them. `support`: metres of marking that
     both views show on top of each other once registered. `pair`: the ids of the cameras. Measured `at` a point (2,) of
-    the pitch, in the directions `told` (2, 1 or 2).
+    the pitch, in the `directions` (2, 1 or 2).
     """
 
     dx_px: float
@@ -85,7 +85,7 @@ class Registration:
     support: float
     pair: tuple[str, str]
     at: Array
-    told: Array
+    directions: Array
 
     @property
     def error_px(self) -> float:
@@ -121,15 +121,15 @@ def register_pair(
     if centre is None:
         return None
     segmented = ((first, first_response), (second, second_response))
-    held = directions_in_common(pitch, first, second, centre)
-    best = _best_fit(pitch, segmented, centre, held)
+    expected_directions = directions_in_common(pitch, first, second, centre)
+    best = _best_fit(pitch, segmented, centre, expected_directions)
     if best is None or best.support < LEAST_SUPPORT_M or best.correlation < LEAST_CORRELATION:
         return None
     # A halfway line fits itself wherever it is slid to. Where a circle should have held it, that is no registration.
-    if best.held < held:
+    if best.held < expected_directions:
         return None
     dx, dy = best.displacement / PIXEL_M
-    return Registration(float(dx), float(dy), best.support, (first.id, second.id), best.middle, best.told)
+    return Registration(float(dx), float(dy), best.support, (first.id, second.id), best.middle, best.directions)
 
 
 def pair_error_px(
@@ -142,7 +142,7 @@ def pair_error_px(
     """
     point = pitch.lift(registration.at)
     first, second = (_put(pitch, other, one.project(point)) for one, other in zip(found, others, strict=True))
-    moved = registration.told @ registration.told.T @ (second - first)[:2] / PIXEL_M
+    moved = registration.directions @ registration.directions.T @ (second - first)[:2] / PIXEL_M
     return float(np.hypot(registration.dx_px + moved[0], registration.dy_px + moved[1]))
 
 
@@ -195,30 +195,34 @@ def directions_in_common(pitch: Field, first: Camera, second: Camera, centre: Ar
 
 @dataclass(frozen=True)
 class _Fit:
-    """Fit of two views: `displacement` (2,) m in the `middle` (2,) in the directions `told` (2, n).
+    """Fit of two views: `displacement` (2,) m in the `middle` (2,) in the `directions` (2, n).
 
     `support`: metres of marking in common; `correlation`: how alike they are.
     """
 
     middle: Array
     displacement: Array
-    told: Array
+    directions: Array
     support: float
     correlation: float
 
     @property
     def held(self) -> int:
         """Number of directions in which the markings hold the views."""
-        return self.told.shape[1]
+        return self.directions.shape[1]
 
 
-def _best_fit(pitch: Field, segmented: Sequence[Segmented], centre: Array, held: int) -> _Fit | None:
+def _best_fit(pitch: Field, segmented: Sequence[Segmented], centre: Array, expected_directions: int) -> _Fit | None:
     """Return the fit where the views should be alike, or, unless they are there, where they look most alike."""
-    expected = _fit(pitch, segmented, centre, np.zeros(2), held)
-    if expected.correlation > ALIKE and expected.held == held and np.hypot(*expected.displacement) < NEAR_M:
+    expected = _fit(pitch, segmented, centre, np.zeros(2), expected_directions)
+    if (
+        expected.correlation > ALIKE
+        and expected.held == expected_directions
+        and np.hypot(*expected.displacement) < NEAR_M
+    ):
         return expected
     guesses = _guesses(pitch, segmented, centre)
-    fits = [expected, *(_fit(pitch, segmented, middle, shift, held) for middle, shift in guesses)]
+    fits = [expected, *(_fit(pitch, segmented, middle, shift, expected_directions) for middle, shift in guesses)]
     return max(fits, key=lambda fit: fit.support * fit.correlation)
 
 
@@ -255,10 +259,10 @@ def _fit(pitch: Field, segmented: Sequence[Segmented], middle: Array, shift: Arr
         forms.append(_forms(camera, surface[::FINEST_STRIDE, ::FINEST_STRIDE]))
     fine = _fine_moves(views[0], views[1], np.concatenate(forms, axis=-1), at_middle, start, pitch.line_width)
 
-    variance, directions = np.linalg.eigh(at_middle @ fine.covariance @ at_middle.T)
-    told = directions[:, variance < LOOSE_M**2][:, :held]
-    displacement = told @ told.T @ at_middle @ fine.moves
-    return _Fit(middle, displacement, told, fine.common_area_m2 / pitch.line_width, fine.correlation)
+    variance, axes = np.linalg.eigh(at_middle @ fine.covariance @ at_middle.T)
+    directions = axes[:, variance < LOOSE_M**2][:, :held]
+    displacement = directions @ directions.T @ at_middle @ fine.moves
+    return _Fit(middle, displacement, directions, fine.common_area_m2 / pitch.line_width, fine.correlation)
 
 
 def _square(middle: Array, half_m: float, step_m: float) -> Array:
@@ -359,10 +363,10 @@ def _fine_moves(
         for least in leasts:
             for _ in range(MOST_ROUNDS):
                 warped, valid = _moved(smooth, seen, coarser, moves - start, stride)
-                pull, information = _normal_equations(warped[0], warped[1], valid, coarser, step_m, blur)
+                right_side, information = _normal_equations(warped[0], warped[1], valid, coarser, step_m, blur)
                 found = at_middle @ moves
                 prior = 1 / max(float(found @ expected @ found), least**2)
-                step = np.linalg.solve(information + prior * np.eye(len(moves)), pull - prior * moves)
+                step = np.linalg.solve(information + prior * np.eye(len(moves)), right_side - prior * moves)
                 moves = moves + step
                 if np.hypot(*(at_middle @ step)) < SETTLED * blur:
                     break

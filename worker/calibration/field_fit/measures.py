@@ -123,11 +123,11 @@ def fit_measures(
     ridge = _ridge_length(pitch, tried)
     known, still_free = _with_known(pitch, everything.pitch, free, measures, ridge)
     final = refine(known, everything.cameras, observations, stitch_weight, still_free)
-    told = [
+    updated = [
         replace(measure, value=parameter.read(final.pitch)) if measure.known else measure
         for measure, parameter in zip(measures, free, strict=True)
     ]
-    return final, [*told, ridge]
+    return final, [*updated, ridge]
 
 
 def leave_measures(pitch: Field) -> list[Measure]:
@@ -149,15 +149,15 @@ def _measure(
     cameras: Sequence[Camera],
 ) -> Measure:
     sigma = float(np.hypot(found.sigma, tried.spread(parameter.read)))
-    left = sigma / parameter.expected
-    known = left <= TOLD
+    remaining = sigma / parameter.expected
+    known = remaining <= TOLD
     detail = ""
     if not given.template.size and parameter.name in ("length_m", "width_m"):
         detail = "markings of your own lie where their coordinates say, whatever the measure"
-    elif left > UNTOUCHED:
+    elif remaining > UNTOUCHED:
         detail = "no line that depends on it is in view"
     elif not known:
-        detail = f"the lines in view leave {left:.0%} of what was open"
+        detail = f"the lines in view leave {remaining:.0%} of what was open"
         if found.most_correlated is not None:
             other, correlation = found.most_correlated
             detail += f"; it cannot be told apart from {_named(other, cameras)} (correlation {correlation:+.2f})"

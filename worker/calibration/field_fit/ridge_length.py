@@ -89,16 +89,16 @@ def try_ridges(base: RefinedPoses, free: Sequence[Parameter], observations: Obse
     lines = base.pitch.line_points()
     measured = observations.reader().measure(lines, base.cameras, EVALUATION_SEARCH_PX)
     unknowns = Unknowns(len(base.cameras), free, Ground.under(lines))
-    held, rows = _fitted(base.pitch, base.cameras, measured, unknowns)
+    base_fit, rows = _fitted(base.pitch, base.cameras, measured, unknowns)
     scale = robust_scale(rows.value)
     together = _together(rows, scale)
     tried = []
     for length in np.arange(0.0, base.pitch.length, SPACING_M).tolist():
-        there, left = _fitted(base.pitch.with_ridge_length(length), base.cameras, measured, unknowns)
+        there, rows_there = _fitted(base.pitch.with_ridge_length(length), base.cameras, measured, unknowns)
         away = there.change_from(base.cameras)
-        loss = float(np.sum(tukey_loss(left.value, scale))) + float(away @ there.prior(unknowns) @ away)
+        loss = float(np.sum(tukey_loss(rows_there.value, scale))) + float(away @ there.prior(unknowns) @ away)
         tried.append(TriedRidge(there.pitch, loss / together))
-    return TriedRidges(held.pitch, tried)
+    return TriedRidges(base_fit.pitch, tried)
 
 
 def _fitted(
@@ -108,7 +108,7 @@ def _fitted(
     unknowns: Unknowns,
 ) -> tuple[Estimate, WeightedRows]:
     """Return the estimate of everything else for a field, and the weighted residuals of the lines there."""
-    here = Estimate.at(pitch, cameras, unknowns)
+    here = Estimate.initial(pitch, cameras, unknowns)
     for _ in range(STEPS):
         unknowns = unknowns.around(here.pitch, here.lines)
         here = gauss_newton_step(here, cameras, measured, unknowns, tukey_weights).to

@@ -194,10 +194,10 @@ def find_contradictions(pairs: Sequence[Pair], gate: Gate) -> list[Contradiction
 
     Two that both agree with others contradict each other only where they share plenty and can be compared.
     """
-    held = {camera for pair in pairs if pair.agrees(gate) for camera in pair.cameras}
+    confirmed = {camera for pair in pairs if pair.agrees(gate) for camera in pair.cameras}
     found = []
     for pair in pairs:
-        loose = [camera for camera in pair.cameras if camera not in held]
+        loose = [camera for camera in pair.cameras if camera not in confirmed]
         if pair.disagrees(gate) and (loose or (pair.plenty and pair.error_px is not None)):
             found.append(Contradiction(pair, loose or pair.cameras))
     return found
@@ -205,11 +205,11 @@ def find_contradictions(pairs: Sequence[Pair], gate: Gate) -> list[Contradiction
 
 def refusal_by_pairs(camera: str, against: Sequence[Contradiction], gate: Gate) -> Refusal | None:
     """Return the refusal of a camera that pairs contradict, None where none does."""
-    its = [one.pair for one in against if camera in one.blamed]
-    if not its:
+    contradicting = [one.pair for one in against if camera in one.blamed]
+    if not contradicting:
         return None
-    reason: Reason = "not-together" if its[0].error_px is None else "disagree"
-    return Refusal(reason, "; ".join(pair.words(gate) for pair in its))
+    reason: Reason = "not-together" if contradicting[0].error_px is None else "disagree"
+    return Refusal(reason, "; ".join(pair.words(gate) for pair in contradicting))
 
 
 def stitch_error_px(pairs: Sequence[Pair], gate: Gate) -> float | None:

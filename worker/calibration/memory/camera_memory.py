@@ -81,23 +81,25 @@ class CameraMemory:
     @classmethod
     def from_first_job(cls, stored: Camera, job: AcceptedJob) -> CameraMemory:
         """Return the memory of the first accepted job, which found a camera that was `stored` before."""
-        told = job.without(job.repainted_markings).for_epoch
-        return cls(stored, Epoch.from_job(*told), None, (), job.repainted_markings, fingerprint(job.lines), job.frames)
+        arguments = job.without(job.repainted_markings).for_epoch
+        return cls(
+            stored, Epoch.from_job(*arguments), None, (), job.repainted_markings, fingerprint(job.lines), job.frames
+        )
 
     def after(self, job: AcceptedJob) -> CameraMemory:
         """Return the memory with one more accepted job; the same frames sent again say nothing new."""
         if job.frames == self.frames:
             return self
         kept = replace(self.aware_of(job.repainted_markings, job.lines), frames=job.frames)
-        told = job.without(kept.repainted_markings).for_epoch
+        arguments = job.without(kept.repainted_markings).for_epoch
         if kept.takes_for_anchor(job):
-            return replace(kept, anchor=kept.anchor.joined(*told))
+            return replace(kept, anchor=kept.anchor.joined(*arguments))
         if kept.recent is None:
-            return replace(kept, recent=Epoch.from_job(*told))
+            return replace(kept, recent=Epoch.from_job(*arguments))
         if kept.recent.looks_like(job.found, job.lines):
-            return replace(kept, recent=kept.recent.joined(*told))
+            return replace(kept, recent=kept.recent.joined(*arguments))
         before = [*kept.earlier, kept.recent] if kept.recent.jobs >= FEWEST_JOBS else list(kept.earlier)
-        return replace(kept, recent=Epoch.from_job(*told), earlier=tuple(before[-MOST_EARLIER:]))
+        return replace(kept, recent=Epoch.from_job(*arguments), earlier=tuple(before[-MOST_EARLIER:]))
 
     def takes_for_anchor(self, job: AcceptedJob) -> bool:
         """True if a job is one of the first nights, with camera and lens as in the very first."""
@@ -153,20 +155,20 @@ class CameraMemory:
         }
 
     @classmethod
-    def from_json(cls, told: Mapping[str, Any]) -> CameraMemory | None:
+    def from_json(cls, document: Mapping[str, Any]) -> CameraMemory | None:
         """Return the memory that `to_json` wrote; None for one that another release wrote otherwise or that cannot
         be read."""
-        if told.get("format") != FORMAT:
+        if document.get("format") != FORMAT:
             return None
         try:
             return cls(
-                camera_from_json(told["origin"]),
-                Epoch.from_json(told["anchor"]),
-                None if told["recent"] is None else Epoch.from_json(told["recent"]),
-                tuple(Epoch.from_json(epoch) for epoch in told["earlier"]),
-                tuple(told["aside"]),
-                told["lines"],
-                told["frames"],
+                camera_from_json(document["origin"]),
+                Epoch.from_json(document["anchor"]),
+                None if document["recent"] is None else Epoch.from_json(document["recent"]),
+                tuple(Epoch.from_json(epoch) for epoch in document["earlier"]),
+                tuple(document["aside"]),
+                document["lines"],
+                document["frames"],
             )
         except (KeyError, TypeError, ValueError):
             # A camera without its memory can still be calibrated, and begins another one.

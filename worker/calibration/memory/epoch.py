@@ -75,8 +75,8 @@ class Epoch:
 
     def without(self, gone: NDArray[np.intp]) -> Epoch:
         """Return the epoch without some line points."""
-        left = ~np.isin(self.index, gone)
-        return replace(self, index=self.index[left], offset=self.offset[left], count=self.count[left])
+        kept = ~np.isin(self.index, gone)
+        return replace(self, index=self.index[kept], offset=self.offset[kept], count=self.count[kept])
 
     def measurements(self, lines: LinePoints) -> Measurements:
         """Return the mean measurements of the `lines` by `camera`."""
@@ -90,12 +90,12 @@ class Epoch:
 
     def looks_like(self, camera: Camera, lines: LinePoints) -> bool:
         """True if a camera has the same lens and looks the same way."""
-        ours, theirs = self.camera.intrinsics, camera.intrinsics
-        same_lens = np.array_equal(ours.matrix, theirs.matrix) and np.array_equal(ours.distortion, theirs.distortion)
+        own, other = self.camera.intrinsics, camera.intrinsics
+        same_lens = np.array_equal(own.matrix, other.matrix) and np.array_equal(own.distortion, other.distortion)
         places = lines.position[self.index]
         apart = np.linalg.norm(camera.project(places) - self.camera.project(places), axis=1)
         apart = apart[np.isfinite(apart)]
-        return bool(same_lens and len(apart) and apart.mean() <= SAME_VIEW_PX * ours.relative_size)
+        return bool(same_lens and len(apart) and apart.mean() <= SAME_VIEW_PX * own.relative_size)
 
     def to_json(self) -> dict[str, Any]:
         """Return the epoch as a JSON object."""
@@ -110,16 +110,16 @@ class Epoch:
         }
 
     @classmethod
-    def from_json(cls, told: Mapping[str, Any]) -> Epoch:
+    def from_json(cls, document: Mapping[str, Any]) -> Epoch:
         """Return the epoch that `to_json` wrote."""
         return cls(
-            camera_from_json(told["camera"]),
-            _unpacked(told["index"], "<u2").astype(np.intp),
-            _unpacked(told["offset"], "<i2") * PX_STEP,
-            _unpacked(told["count"], "<u2").astype(float),
-            int(told["jobs"]),
-            None if told["first"] is None else datetime.fromisoformat(told["first"]),
-            None if told["last"] is None else datetime.fromisoformat(told["last"]),
+            camera_from_json(document["camera"]),
+            _unpacked(document["index"], "<u2").astype(np.intp),
+            _unpacked(document["offset"], "<i2") * PX_STEP,
+            _unpacked(document["count"], "<u2").astype(float),
+            int(document["jobs"]),
+            None if document["first"] is None else datetime.fromisoformat(document["first"]),
+            None if document["last"] is None else datetime.fromisoformat(document["last"]),
         )
 
 
@@ -150,22 +150,22 @@ def camera_to_json(camera: Camera) -> dict[str, Any]:
     }
 
 
-def camera_from_json(told: Mapping[str, Any]) -> Camera:
+def camera_from_json(document: Mapping[str, Any]) -> Camera:
     """Return the camera that `camera_to_json` wrote."""
-    width, height = told["size"]
-    lens = LENSES[told["model"]](
-        np.array(told["matrix"], dtype=float),
-        np.array(told["distortion"], dtype=float),
+    width, height = document["size"]
+    lens = LENSES[document["model"]](
+        np.array(document["matrix"], dtype=float),
+        np.array(document["distortion"], dtype=float),
         (width, height),
-        dict(told["sigma"]),
-        told.get("sigma_from"),
+        dict(document["sigma"]),
+        document.get("sigma_from"),
     )
-    return Camera(told["id"], lens, Pose(np.array(told["rotation"]), np.array(told["position"])))
+    return Camera(document["id"], lens, Pose(np.array(document["rotation"]), np.array(document["position"])))
 
 
 def _packed(values: NDArray[Any], kind: str) -> str:
     return base64.b64encode(values.astype(kind).tobytes()).decode()
 
 
-def _unpacked(told: str, kind: str) -> NDArray[Any]:
-    return np.frombuffer(base64.b64decode(told), dtype=kind)
+def _unpacked(text: str, kind: str) -> NDArray[Any]:
+    return np.frombuffer(base64.b64decode(text), dtype=kind)

@@ -47,12 +47,12 @@ def find_repainted_markings(memory: CameraMemory, measured: Measurements, lines:
     markings, counts = np.unique(differ.marking, return_counts=True)
     candidates = markings[counts >= FEWEST_POINTS]
     limit_px = LEAST_PX * camera.intrinsics.relative_size
-    anew = [
+    repainted = [
         number
         for number, metres in differ.explained_by(candidates).items()
         if abs(metres) > LEAST_M and abs(metres) * np.median(differ.across[differ.marking == number]) > limit_px
     ]
-    together = np.union1d(known, anew).astype(np.intp)
+    together = np.union1d(known, repainted).astype(np.intp)
     believable = len(together) <= MOST_MARKINGS * len(np.union1d(known, candidates))
     return together if believable else known
 
@@ -129,7 +129,7 @@ class _Differences:
             root = np.sqrt(weight)
             rows = np.concatenate([jacobian * root[:, None], known]) / scale
             change = np.linalg.lstsq(rows, np.append(-offset * root, np.zeros(POSE_NUMBERS)), rcond=HELD)[0] / scale
-            left = np.abs(offset + jacobian @ change)
-            weight = np.minimum(1.0, HUBER / np.maximum(left, TINY))
-        loss = np.sum(weight * (2 - weight) * left**2) + np.sum((known @ change) ** 2)
+            residual = np.abs(offset + jacobian @ change)
+            weight = np.minimum(1.0, HUBER / np.maximum(residual, TINY))
+        loss = np.sum(weight * (2 - weight) * residual**2) + np.sum((known @ change) ** 2)
         return float(loss) / 2, change

@@ -58,11 +58,11 @@ class LensGain:
     @property
     def found(self) -> PointFit:
         """Fit `after`, whose lens has the `sigma` of what was freed and of what it keeps of the lens before."""
-        lens, told = self.after.camera.intrinsics, dict(self.sigma)
+        lens, freed = self.after.camera.intrinsics, dict(self.sigma)
         names = {"centre x": "cx", "centre y": "cy"}
-        one = told.pop("focal length")
+        one = freed.pop("focal length")
         both = {"fx": one, "fy": one * float(lens.matrix[1, 1] / lens.matrix[0, 0])}
-        known = {**lens.sigma, **both, **{names.get(name, name): value for name, value in told.items()}}
+        known = {**lens.sigma, **both, **{names.get(name, name): value for name, value in freed.items()}}
         return replace(self.after, camera=self.after.camera.with_lens(replace(lens, sigma=known)))
 
 

@@ -76,12 +76,12 @@ class CrossChecks:
         mean = np.concatenate([found.mean, np.zeros(len(heights))])
         values, covariances, noises = list[Array](), list[Array](), list[Array]()
         for half in self._halves:
-            said = LineLikelihood(here, half, [None] * len(half), believed.unknowns).sandwich_at(changes, heights)
-            covariance = np.asarray(np.linalg.inv(mixing.T @ said.bread @ mixing + prior), dtype=float)
-            pull = said.bread @ np.concatenate([changes, heights]) - said.gradient
-            values.append(covariance @ (mixing.T @ pull + prior @ mean))
+            sandwich = LineLikelihood(here, half, [None] * len(half), believed.unknowns).sandwich_at(changes, heights)
+            covariance = np.asarray(np.linalg.inv(mixing.T @ sandwich.bread @ mixing + prior), dtype=float)
+            information_vector = sandwich.bread @ np.concatenate([changes, heights]) - sandwich.gradient
+            values.append(covariance @ (mixing.T @ information_vector + prior @ mean))
             covariances.append(covariance)
-            noises.append(covariance @ (mixing.T @ said.spread @ mixing) @ covariance)
+            noises.append(covariance @ (mixing.T @ sandwich.spread @ mixing) @ covariance)
         # The prior's error is the same in both, and they differ in how far they follow it.
         shared = covariances[0] - covariances[1]
         errors = len(found.value)

@@ -44,7 +44,7 @@ class Estimate:
     uneven_m: float
 
     @classmethod
-    def at(cls, pitch: Field, cameras: Sequence[Camera], unknowns: Unknowns) -> Estimate:
+    def initial(cls, pitch: Field, cameras: Sequence[Camera], unknowns: Unknowns) -> Estimate:
         """Return the estimate before any step."""
         return cls(
             pitch,
@@ -80,12 +80,14 @@ class Estimate:
 
     def prior(self, unknowns: Unknowns) -> Array:
         """Return the information (U, U) on all unknowns before any line is measured."""
-        known = np.zeros((len(unknowns), len(unknowns)))
+        information = np.zeros((len(unknowns), len(unknowns)))
         poses = POSE_NUMBERS * unknowns.views
-        known[:poses, :poses] = self.weak_prior()
-        known[poses : unknowns.dense, poses : unknowns.dense] = np.diag([p.expected**-2 for p in unknowns.parameters])
-        known[unknowns.dense :, unknowns.dense :] = self.ground_precision(unknowns)
-        return known
+        information[:poses, :poses] = self.weak_prior()
+        information[poses : unknowns.dense, poses : unknowns.dense] = np.diag(
+            [p.expected**-2 for p in unknowns.parameters]
+        )
+        information[unknowns.dense :, unknowns.dense :] = self.ground_precision(unknowns)
+        return information
 
     def ground_precision(self, unknowns: Unknowns) -> Array:
         """Return the information (K, K) on the heights of the ground before any line is measured."""
@@ -126,7 +128,7 @@ def gauss_newton_step(
     """Take one Gauss-Newton step for all unknowns; `found`: poses at which the weak prior is centred."""
     equations = normal_equations(weigh_rows(here.rows(measured, unknowns), here.heights, unknowns, weigh))
     prior = here.prior(unknowns)
-    pull = equations.gradient + prior @ here.change_from(found)
+    gradient = equations.gradient + prior @ here.change_from(found)
     covariance = np.asarray(np.linalg.inv(equations.information + prior), dtype=float)
-    move = -covariance @ pull
+    move = -covariance @ gradient
     return GaussNewtonStep(here.moved(move, unknowns), move, covariance)

@@ -34,21 +34,22 @@ LEAST_HELD, TINY = 1e-9, 1e-300
 
 @dataclass(frozen=True)
 class MarginalInformation:
-    """Information on changes of the dense unknowns (D,) with the ground marginalised: `known` (D, D) and `pull` (D,).
+    """Information on changes of the dense unknowns (D,) with the ground marginalised: `matrix` (D, D) and `vector`
+    (D,).
 
-    `level` (K,) and `tilt` (K, D): the heights of the ground are `level - tilt @ changes`. `repeated`: covariance of
-    tonight's poses by tonight's measurement alone.
+    `ground_mean` (K,) and `ground_gain` (K, D): the heights of the ground are `ground_mean - ground_gain @ changes`.
+    `repeatability_covariance`: of tonight's poses by tonight's measurement alone.
     """
 
-    known: Array
-    pull: Array
-    level: Array
-    tilt: Array
-    repeated: Array
+    matrix: Array
+    vector: Array
+    ground_mean: Array
+    ground_gain: Array
+    repeatability_covariance: Array
 
     def heights(self, changes: Array) -> Array:
         """Return the likeliest heights (K,) of the ground after changes (D,)."""
-        return self.level - self.tilt @ changes
+        return self.ground_mean - self.ground_gain @ changes
 
 
 @dataclass(frozen=True)
@@ -109,7 +110,7 @@ class LineLikelihood:
         if self._remembered:
             alone = [rows.shifted(changes, heights, unknowns) for rows in self._tonight]
             tonight = Sandwich.of(alone, heights, unknowns)
-        repeated = tonight.covariance_of_poses(self._here)
+        repeatability_covariance = tonight.covariance_of_poses(self._here)
 
         # Whatever the ground: its heights are eliminated.
         even = self._here.ground_precision(unknowns)
@@ -117,12 +118,14 @@ class LineLikelihood:
         effect: Array = np.asarray(np.linalg.solve(of_heights, bread[dense:, :dense]), dtype=float)
         towards = gradient[dense:] + even @ heights
         information = bread[:dense, :dense] - bread[:dense, dense:] @ effect
-        pull = effect.T @ towards - gradient[:dense]
+        information_vector = effect.T @ towards - gradient[:dense]
         reduced = np.concatenate([np.eye(dense), -effect.T], axis=1)
         varies = reduced @ spread @ reduced.T + effect.T @ even @ effect
-        believed, drawn = _believed(information, pull, varies)
+        shrunk, shrunk_vector = _shrunk_sandwich(information, information_vector, varies)
         risen = heights - np.asarray(np.linalg.solve(of_heights, towards), dtype=float)
-        return MarginalInformation(believed, drawn + believed @ changes, risen + effect @ changes, effect, repeated)
+        return MarginalInformation(
+            shrunk, shrunk_vector + shrunk @ changes, risen + effect @ changes, effect, repeatability_covariance
+        )
 
     def sandwich_at(self, changes: Array, heights: Array) -> Sandwich:
         """Sum up all lines after changes (D,), on a ground of `heights` (K,)."""
@@ -157,20 +160,20 @@ def _by_lens(rows: Rows, unknowns: Unknowns, view: int, differs: Array) -> Array
     return changed
 
 
-def _believed(information: Array, pull: Array, spread: Array) -> tuple[Array, Array]:
-    """Return the `information` (A, A) that is left when the `pull` (A,) varies by `spread` (A, A) instead of by as much
-    as that, and the pull to the same place that goes with it.
+def _shrunk_sandwich(information: Array, information_vector: Array, spread: Array) -> tuple[Array, Array]:
+    """Return the `information` (A, A) that is left when its vector (A,) varies by `spread` (A, A) instead of by as much
+    as that, and the vector to the same place that goes with it.
 
     A few patches of line say little of the variance in any one direction, so it is shrunk to the mean variance.
     """
     scale = np.sqrt(np.maximum(np.diag(information), TINY))
     values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
-    held = values > LEAST_HELD
-    directions, root = vectors[:, held], np.sqrt(values[held])
+    known = values > LEAST_HELD
+    directions, root = vectors[:, known], np.sqrt(values[known])
     whitening = directions / root / scale[:, None]
     variance = whitening.T @ spread @ whitening
     usual = np.trace(variance) / max(len(variance), 1)
     variance = (variance + usual * np.eye(len(variance))) / 2
     back = directions * root * scale[:, None]
-    believed = np.asarray(back @ np.linalg.solve(variance, back.T))
-    return believed, believed @ (whitening @ (whitening.T @ pull))
+    shrunk = np.asarray(back @ np.linalg.solve(variance, back.T))
+    return shrunk, shrunk @ (whitening @ (whitening.T @ information_vector))

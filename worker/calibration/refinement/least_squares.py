@@ -61,8 +61,8 @@ class Rows:
         The misfit is smaller where a lens that was wrong has been corrected.
         """
         offset = self.offset + self.jacobian @ changes[self.columns]
-        left = offset - self.up * unknowns.ground.under_points(heights, self.point)
-        noise_px = replace(self.measured, misfit_px=misfit_px(left, self.measured)).noise_px
+        residual = offset - self.up * unknowns.ground.under_points(heights, self.point)
+        noise_px = replace(self.measured, misfit_px=misfit_px(residual, self.measured)).noise_px
         return replace(self, offset=offset, noise_px=noise_px)
 
     @classmethod
@@ -127,7 +127,7 @@ class WeightedRows:
     `residual` (M,) px; `points` (P,) and `at` (M,): which of the line points the rows are about; `shared` (M,): True if
     other rows are about the same one; `weight` (M,) 1 / px²: of a shared point that of the measurement alone, of
     another with all that it may be off by. `local` (M, 2) px per metre of (e, r); `precision` (P, 2, 2) of those given
-    the rows, and `beside` (P, 2) m, their mean. `value` (M,): the residual in units of everything it may be off by, and
+    the rows, and `paint_mean` (P, 2) m. `value` (M,): the residual in units of everything it may be off by, and
     `belief` (M,), its robust weight.
     """
 
@@ -140,7 +140,7 @@ class WeightedRows:
     weight: Array
     local: Array
     precision: Array
-    beside: Array
+    paint_mean: Array
     value: Array
     belief: Array
 
@@ -155,20 +155,20 @@ class WeightedRows:
         return self.local[:, 1]
 
     @property
-    def drawn_together(self) -> Array:
+    def schur_factor(self) -> Array:
         """Factor (M, 2) of the rank-2 term that eliminating a shared point's paint error subtracts from its rows'
         information; 0 for a point that one view alone measures."""
-        drawn = np.zeros((len(self.at), 2))
+        factor = np.zeros((len(self.at), 2))
         at = self.at[self.shared]
         root = np.linalg.cholesky(np.linalg.inv(self.precision))[at]
         heavy = self.local[self.shared] * self.weight[self.shared, None]
-        drawn[self.shared] = np.sum(root * heavy[:, :, None], axis=1)
-        return drawn
+        factor[self.shared] = np.sum(root * heavy[:, :, None], axis=1)
+        return factor
 
     @property
-    def left(self) -> Array:
+    def residual_given_paint(self) -> Array:
         """Residuals (M,) px given the paint: with shared points at the mean place that all their rows say."""
-        return self.residual - self.shared * np.sum(self.local * self.beside[self.at], axis=1)
+        return self.residual - self.shared * np.sum(self.local * self.paint_mean[self.at], axis=1)
 
 
 def weigh_rows(rows: Sequence[Rows], heights: Array, unknowns: Unknowns, weigh: Weigh) -> WeightedRows:
@@ -194,15 +194,19 @@ def weigh_rows(rows: Sequence[Rows], heights: Array, unknowns: Unknowns, weigh: 
     of_point = np.bincount(at, belief, len(points)) / np.maximum(np.bincount(at, trust, len(points)), 1e-12)
     variance = by_itself / np.clip(of_point, LEAST_BELIEF, 1.0)[:, None]
     weight = np.where(shared, trust / noise, belief / expected)
-    precision, beside = _beside(local, weight, residual, at, variance)
+    precision, paint_mean = _paint_posterior(local, weight, residual, at, variance)
     if shared.any():
-        apart = (residual - np.sum(local * beside[at], axis=1)) / np.sqrt(noise)
-        weight[shared] *= weigh(apart[shared])
-        precision, beside = _beside(local, weight, residual, at, variance)
-    return WeightedRows(rows, unknowns, residual, points, at, shared, weight, local, precision, beside, value, belief)
+        normalised = (residual - np.sum(local * paint_mean[at], axis=1)) / np.sqrt(noise)
+        weight[shared] *= weigh(normalised[shared])
+        precision, paint_mean = _paint_posterior(local, weight, residual, at, variance)
+    return WeightedRows(
+        rows, unknowns, residual, points, at, shared, weight, local, precision, paint_mean, value, belief
+    )
 
 
-def _beside(local: Array, weight: Array, residual: Array, at: NDArray[np.intp], variance: Array) -> tuple[Array, Array]:
+def _paint_posterior(
+    local: Array, weight: Array, residual: Array, at: NDArray[np.intp], variance: Array
+) -> tuple[Array, Array]:
     """Return precision (P, 2, 2) and mean (P, 2), m, of each line point's paint error, all else fixed.
 
     `variance` (P, 2) m²: the prior of it.
@@ -212,8 +216,8 @@ def _beside(local: Array, weight: Array, residual: Array, at: NDArray[np.intp], 
     for n in (0, 1):
         precision[:, n, n] = 1 / variance[:, n] + np.bincount(at, weight * local[:, n] ** 2, count)
     precision[:, 0, 1] = precision[:, 1, 0] = np.bincount(at, weight * local[:, 0] * local[:, 1], count)
-    pull = np.stack([np.bincount(at, weight * residual * local[:, n], count) for n in (0, 1)], axis=1)
-    return precision, np.asarray(np.linalg.solve(precision, pull[..., None])[..., 0], dtype=float)
+    information_vector = np.stack([np.bincount(at, weight * residual * local[:, n], count) for n in (0, 1)], axis=1)
+    return precision, np.asarray(np.linalg.solve(precision, information_vector[..., None])[..., 0], dtype=float)
 
 
 @dataclass(frozen=True)
@@ -231,31 +235,31 @@ def normal_equations(of: WeightedRows) -> NormalEquations:
     by views, and by pairs of views that share points.
     """
     unknowns, dense = of.unknowns, of.unknowns.dense
-    drawn = of.drawn_together
+    factor = of.schur_factor
     information = np.zeros((len(unknowns), len(unknowns)))
     gradient = np.zeros(len(unknowns))
-    pull = of.weight * of.left
-    risen = np.stack([_summed(of.at, -of.up * drawn[:, n], len(of.points)) for n in (0, 1)], axis=1)
-    by_ground = -of.weight * of.up - np.sum(drawn * risen[of.at], axis=1)
-    alone = of.weight - np.sum(drawn**2, axis=1)
+    weighted_residual = of.weight * of.residual_given_paint
+    risen = np.stack([_summed(of.at, -of.up * factor[:, n], len(of.points)) for n in (0, 1)], axis=1)
+    by_ground = -of.weight * of.up - np.sum(factor * risen[of.at], axis=1)
+    alone = of.weight - np.sum(factor**2, axis=1)
     for rows, part in zip(of.rows, of.parts(), strict=True):
         columns, jacobian = rows.columns, rows.jacobian
         information[np.ix_(columns, columns)] += (jacobian * alone[part, None]).T @ jacobian
-        gradient[columns] += jacobian.T @ pull[part]
+        gradient[columns] += jacobian.T @ weighted_residual[part]
         across = _by_node(unknowns.ground, rows.point, jacobian * by_ground[part, None])
         information[columns, dense:] += across.T
         information[dense:, columns] += across
     for (one, first), (other, second) in combinations(zip(of.rows, of.parts(), strict=True), 2):
         _, at, there = np.intersect1d(one.point, other.point, assume_unique=True, return_indices=True)
-        together = np.sum(drawn[first][at] * drawn[second][there], axis=1)
+        together = np.sum(factor[first][at] * factor[second][there], axis=1)
         coupled = (one.jacobian[at] * together[:, None]).T @ other.jacobian[there]
         information[np.ix_(one.columns, other.columns)] -= coupled
         information[np.ix_(other.columns, one.columns)] -= coupled.T
     level = _summed(of.at, of.weight * of.up**2, len(of.points)) - np.sum(risen**2, axis=1)
     information[dense:, dense:] = _between_nodes(unknowns.ground, of.points, level)
-    gradient[dense:] = _by_node(unknowns.ground, of.points, -_summed(of.at, of.up * pull, len(of.points))[:, None])[
-        :, 0
-    ]
+    gradient[dense:] = _by_node(
+        unknowns.ground, of.points, -_summed(of.at, of.up * weighted_residual, len(of.points))[:, None]
+    )[:, 0]
     return NormalEquations(information, gradient)
 
 
@@ -286,26 +290,28 @@ def error_of_measurement(of: WeightedRows, information: Array) -> Array:
     Neighbours on a line share the error of its paint and of the lens, so they are not as many as they seem (the
     sandwich of Liang and Zeger, 1986). On top, a fifth of what their expected errors say.
     """
-    by_cluster = _pulls(of)
+    by_cluster = _cluster_gradients(of)
     usual = float(np.sum(of.belief**2) / max(float(np.sum(of.belief)), 1e-12))
     return np.asarray(by_cluster.T @ by_cluster + LEAST_NOISE * usual * information)
 
 
-def _pulls(of: WeightedRows) -> Array:
+def _cluster_gradients(of: WeightedRows) -> Array:
     """Return the part (C, U) of the gradient of each ten metres of line, over all views."""
     unknowns, ground = of.unknowns, of.unknowns.ground
     clusters, cluster_of = np.unique(of.points // CLUSTER_POINTS, return_inverse=True)
     count, size = len(clusters), len(ground)
-    cluster, pull = cluster_of[of.at], of.weight * of.left
-    found = np.zeros((count, len(unknowns)))
+    cluster, weighted_residual = cluster_of[of.at], of.weight * of.residual_given_paint
+    gradients = np.zeros((count, len(unknowns)))
     for rows, part in zip(of.rows, of.parts(), strict=True):
-        for column, jacobian in zip(rows.columns, rows.jacobian.T, strict=True):
-            found[:, column] += _summed(cluster[part], jacobian * pull[part], count)
+        for column, derivatives in zip(rows.columns, rows.jacobian.T, strict=True):
+            gradients[:, column] += _summed(cluster[part], derivatives * weighted_residual[part], count)
     node, share = ground.node[of.points], ground.share[of.points]
-    risen = -_summed(of.at, of.up * pull, len(of.points))
+    risen = -_summed(of.at, of.up * weighted_residual, len(of.points))
     pair = cluster_of[:, None] * size + node
-    found[:, unknowns.dense :] = _summed(pair.ravel(), (share * risen[:, None]).ravel(), count * size).reshape(-1, size)
-    return found
+    gradients[:, unknowns.dense :] = _summed(pair.ravel(), (share * risen[:, None]).ravel(), count * size).reshape(
+        -1, size
+    )
+    return gradients
 
 
 def _joined(parts: Sequence[Array | NDArray[np.intp]]) -> Array:

@@ -185,8 +185,8 @@ class _Errors:
         tonight, anchor, *others = (view for view, owner in enumerate(self._owner_of) if owner == number)
         recent, earlier = (others[:1], others[1:]) if memory.recent else ([], others)
 
-        told = lens_values(memory.origin.intrinsics) - lens_values(camera.intrinsics)
-        self._blocks.append(self._lens(number, told))
+        stored_lens_offset = lens_values(memory.origin.intrinsics) - lens_values(camera.intrinsics)
+        self._blocks.append(self._lens(number, stored_lens_offset))
         from_origin = self._from_stored(number, memory.origin)
         self._blocks.append([self._move([tonight, anchor, *others], MOVED, MOVEMENT_SCALES, from_origin)])
         self._blocks.append([self._heat([anchor, tonight, *recent], ONCE)])

@@ -138,45 +138,45 @@ def refine(
     if stitch_weight == 0 and len(cameras) > 1 and not free:
         return _each_alone(pitch, cameras, observations, stored or cameras, memories)
     unknowns = Unknowns(len(cameras), free, Ground.under(pitch.line_points()))
-    begun = Estimate.at(pitch, cameras, unknowns)
+    begun = Estimate.initial(pitch, cameras, unknowns)
     remembered = memories_of_field(memories or [None] * len(cameras), begun.lines)
-    finish = _Finish(reader or observations.reader(), unknowns, _aside(remembered), cameras)
-    caught = finish.catch(begun, searches_px)
-    anew = _painted_anew(caught, remembered, finish)
-    if len(anew) != len(finish.anew):
+    refiner = _Refiner(reader or observations.reader(), unknowns, _repainted_in_memory(remembered), cameras)
+    caught = refiner.catch(begun, searches_px)
+    repainted = _find_repainted(caught, remembered, refiner)
+    if len(repainted) != len(refiner.repainted):
         # They have pulled the cameras away from all other markings.
-        finish = replace(finish, anew=anew)
-        caught = finish.catch(begun, searches_px)
-    last = finish.settle(caught)
+        refiner = replace(refiner, repainted=repainted)
+        caught = refiner.catch(begun, searches_px)
+    last = refiner.settle(caught)
     uneven = last.unevenness(unknowns, unknowns.ground.ordinary)
     here = replace(last.to, uneven_m=uneven)
     # Judged by a wider search than the last round's, which could not see an error larger than itself.
-    return _with_moves(_assessed(here, stored or cameras, remembered, finish), here, finish)
+    return _with_pose_shift_if_corrected(_assessed(here, stored or cameras, remembered, refiner), here, refiner)
 
 
 @dataclass(frozen=True)
-class _Finish:
+class _Refiner:
     """Gauss-Newton refinement of cameras `found` near the lines that a `reader` measures.
 
-    `anew`: the numbers of the markings that are painted elsewhere and say nothing of any pose.
+    `repainted`: the numbers of the markings that are painted elsewhere and say nothing of any pose.
     """
 
     reader: LineReader
     unknowns: Unknowns
-    anew: NDArray[np.intp]
+    repainted: NDArray[np.intp]
     found: Sequence[Camera]
 
     def measure(self, here: Estimate, search_px: float) -> list[Measurements]:
         """Measure the lines within `search_px` (of a 4K frame) of where the cameras expect them, on their ground."""
-        return self.but_anew(self.reader.measure(here.on_ground(self.unknowns), here.cameras, search_px))
+        return self.without_repainted(self.reader.measure(here.on_ground(self.unknowns), here.cameras, search_px))
 
-    def but_anew(self, measured: Sequence[Measurements]) -> list[Measurements]:
+    def without_repainted(self, measured: Sequence[Measurements]) -> list[Measurements]:
         """Return the measurements without those of repainted markings."""
-        if len(self.anew) == 0:
+        if len(self.repainted) == 0:
             return list(measured)
-        return [found[~np.isin(found.points.marking, self.anew)] for found in measured]
+        return [found[~np.isin(found.points.marking, self.repainted)] for found in measured]
 
-    def around(self, here: Estimate) -> _Finish:
+    def around(self, here: Estimate) -> _Refiner:
         """Return the refinement for the field of an estimate, which steps may have changed."""
         return replace(self, unknowns=self.unknowns.around(here.pitch, here.lines))
 
@@ -226,14 +226,16 @@ class _Finish:
         """Minimise Huber's loss of the same measurements."""
         for _ in range(MOST_STEPS):
             before = here
-            here = gauss_newton_step(here, self.found, doubted(here, measured), self.unknowns, huber_weights).to
+            here = gauss_newton_step(
+                here, self.found, with_misfit_noise(here, measured), self.unknowns, huber_weights
+            ).to
             if here.largest_move_m(before) < SETTLED_M:
                 break
         return here
 
     def towards_tukey(self, here: Estimate, measured: Sequence[Measurements]) -> GaussNewtonStep:
         """Take one step towards the minimum of Tukey's loss, and estimate the ground's unevenness there."""
-        measured = doubted(here, measured)
+        measured = with_misfit_noise(here, measured)
         made = gauss_newton_step(here, self.found, measured, self.unknowns, tukey_weights)
         uneven = made.unevenness(self.unknowns, self.unknowns.ground.even)
         # A lens or a field that is wrong bends lines as a swelling ground does: the more of it, the flatter the ground.
@@ -241,26 +243,26 @@ class _Finish:
         return replace(made, to=replace(made.to, uneven_m=min(uneven, self.unknowns.ground.most_m)))
 
 
-def _aside(remembered: Sequence[CameraMemory | None]) -> NDArray[np.intp]:
+def _repainted_in_memory(remembered: Sequence[CameraMemory | None]) -> NDArray[np.intp]:
     """Return the markings that the memory of any camera says are painted elsewhere."""
     known = [memory.repainted_markings for memory in remembered if memory is not None]
     return np.unique(np.concatenate([np.empty(0), *known])).astype(np.intp)
 
 
-def _painted_anew(here: Estimate, remembered: Sequence[CameraMemory | None], finish: _Finish) -> NDArray[np.intp]:
+def _find_repainted(here: Estimate, remembered: Sequence[CameraMemory | None], refiner: _Refiner) -> NDArray[np.intp]:
     """Return the markings that lie elsewhere than the memory of any camera has them: all see the same paint."""
     if not any(remembered):
-        return finish.anew
-    measured = finish.reader.measure(here.on_ground(finish.unknowns), here.cameras, SEARCH_PX[0])
-    told = [
+        return refiner.repainted
+    measured = refiner.reader.measure(here.on_ground(refiner.unknowns), here.cameras, SEARCH_PX[0])
+    found = [
         find_repainted_markings(memory, found, here.lines)
         for memory, found in zip(remembered, measured, strict=True)
         if memory is not None
     ]
-    return np.unique(np.concatenate([finish.anew, *told]))
+    return np.unique(np.concatenate([refiner.repainted, *found]))
 
 
-def doubted(here: Estimate, measured: Sequence[Measurements]) -> list[Measurements]:
+def with_misfit_noise(here: Estimate, measured: Sequence[Measurements]) -> list[Measurements]:
     """Return the measurements with their misfit: the error that neither noise nor paint nor ground explains.
 
     Lens and field are never quite what they are said to be, by pixels alike near and far. Without it, a far line that a
@@ -282,11 +284,11 @@ def evaluate_poses(
 ) -> RefinedPoses:
     """Evaluate poses that are left as they are, with everything else; arguments as for `refine`."""
     unknowns = Unknowns(len(cameras), free, Ground.under(pitch.line_points()))
-    here = Estimate.at(pitch, cameras, unknowns)
+    here = Estimate.initial(pitch, cameras, unknowns)
     remembered = memories_of_field(memories or [None] * len(cameras), here.lines)
-    finish = _Finish(observations.reader(), unknowns, _aside(remembered), cameras)
-    finish = replace(finish, anew=_painted_anew(here, remembered, finish))
-    return _assessed(here, stored or cameras, remembered, finish)
+    refiner = _Refiner(observations.reader(), unknowns, _repainted_in_memory(remembered), cameras)
+    refiner = replace(refiner, repainted=_find_repainted(here, remembered, refiner))
+    return _assessed(here, stored or cameras, remembered, refiner)
 
 
 def _each_alone(
@@ -306,34 +308,34 @@ def _each_alone(
 
 
 def _assessed(
-    here: Estimate, stored: Sequence[Camera], remembered: Sequence[CameraMemory | None], finish: _Finish
+    here: Estimate, stored: Sequence[Camera], remembered: Sequence[CameraMemory | None], refiner: _Refiner
 ) -> RefinedPoses:
-    finish = finish.around(here)
-    lines, reader = here.on_ground(finish.unknowns), finish.reader
+    refiner = refiner.around(here)
+    lines, reader = here.on_ground(refiner.unknowns), refiner.reader
     evidence = reader.evidence(here.pitch, lines, here.cameras)
     everything = _of_seen(reader.measure(lines, here.cameras, EVALUATION_SEARCH_PX), evidence)
-    measured = doubted(here, finish.but_anew(everything))
+    measured = with_misfit_noise(here, refiner.without_repainted(everything))
     # A field that is wrong looks like a ground that swells a lot: judged, it has to be an ordinary ground.
-    ordinary = replace(here, uneven_m=min(here.uneven_m, finish.unknowns.ground.usual_m))
-    finished = estimate_uncertainty(ordinary, stored, remembered, measured, evidence, finish.unknowns)
+    ordinary = replace(here, uneven_m=min(here.uneven_m, refiner.unknowns.ground.usual_m))
+    refined = estimate_uncertainty(ordinary, stored, remembered, measured, evidence, refiner.unknowns)
     each = [
-        replace(one, measured=its, repainted_markings=tuple(finish.anew.tolist()))
-        for one, its in zip(finished.each, doubted(here, everything), strict=True)
+        replace(one, measured=its, repainted_markings=tuple(refiner.repainted.tolist()))
+        for one, its in zip(refined.each, with_misfit_noise(here, everything), strict=True)
     ]
-    return replace(finished, each=each)
+    return replace(refined, each=each)
 
 
-def _with_moves(finished: RefinedPoses, here: Estimate, finish: _Finish) -> RefinedPoses:
+def _with_pose_shift_if_corrected(refined: RefinedPoses, here: Estimate, refiner: _Refiner) -> RefinedPoses:
     """Return the poses, with the move of the cameras for each parameter of the field that the lines contradict."""
-    measured = finish.but_anew([one.measured for one in finished.each if one.measured is not None])
+    measured = refiner.without_repainted([one.measured for one in refined.each if one.measured is not None])
     deviations = [
-        replace(one, moves_m=_moves_m(one, here, measured, finish)) if one.camera is None and is_sure(one) else one
-        for one in finished.deviations
+        replace(one, moves_m=_moves_m(one, here, measured, refiner)) if one.camera is None and is_sure(one) else one
+        for one in refined.deviations
     ]
-    return replace(finished, deviations=deviations)
+    return replace(refined, deviations=deviations)
 
 
-def _moves_m(wrong: Deviation, here: Estimate, measured: Sequence[Measurements], finish: _Finish) -> dict[str, float]:
+def _moves_m(wrong: Deviation, here: Estimate, measured: Sequence[Measurements], refiner: _Refiner) -> dict[str, float]:
     """Return the move (m) of each camera, by id, on the same measurements with a measure of the field corrected.
 
     Nothing for a number that no field can have otherwise.
@@ -343,10 +345,10 @@ def _moves_m(wrong: Deviation, here: Estimate, measured: Sequence[Measurements],
         return {}
     _, pitch = measure.applied(here.cameras, here.pitch, wrong.value)
     there = replace(here, pitch=pitch, lines=pitch.same_line_points(here.lines))
-    finish = finish.around(there)
-    there = finish.down_huber(there, measured)
+    refiner = refiner.around(there)
+    there = refiner.down_huber(there, measured)
     for _ in range(MOST_STEPS):
-        there = finish.towards_tukey(there, measured).to
+        there = refiner.towards_tukey(there, measured).to
     return {
         before.id: float(np.linalg.norm(after.pose.position - before.pose.position))
         for before, after in zip(here.cameras, there.cameras, strict=True)

@@ -240,27 +240,27 @@ def estimate_uncertainty(
     unknowns = unknowns_of(here, memories, solved)
     lines = LineLikelihood(here, measured, memories, unknowns)
     information = lines.information()
-    believed = build_priors(here, stored, memories, unknowns, solved, information.known)
+    believed = build_priors(here, stored, memories, unknowns, solved, information.matrix)
     for _ in range(ASKED_AGAIN):
         changes = believed.mixing @ _posterior(believed, information).value
         information = lines.information_at(changes, information.heights(changes))
-    judgement = _Judgement.of(here, believed, information)
-    heights = information.heights(believed.mixing @ judgement.found.value)
-    checks = CrossChecks(here, measured, believed, judgement.found, heights)
-    return judgement.finished(memories, measured, evidence, checks, solved)
+    joint = _JointPosterior.of(here, believed, information)
+    heights = information.heights(believed.mixing @ joint.found.value)
+    checks = CrossChecks(here, measured, believed, joint.found, heights)
+    return joint.to_refined_poses(memories, measured, evidence, checks, solved)
 
 
 def _posterior(believed: Priors, information: MarginalInformation) -> Posterior:
     """Return the posterior of the independent errors, by their priors and the lines."""
     mixing = believed.mixing
-    return posterior(mixing.T @ information.known @ mixing, mixing.T @ information.pull, believed.blocks)
+    return posterior(mixing.T @ information.matrix @ mixing, mixing.T @ information.vector, believed.blocks)
 
 
 @dataclass(frozen=True)
-class _Judgement:
+class _JointPosterior:
     """Joint posterior of all unknowns: `found` (A,) of the independent errors.
 
-    `by_lines` (A, A): their covariance if nothing is known of how far cameras moved. `repeated`: see
+    `by_lines` (A, A): their covariance if nothing is known of how far cameras moved. `repeatability_covariance`: see
     `MarginalInformation`.
     """
 
@@ -268,7 +268,7 @@ class _Judgement:
     believed: Priors
     found: Posterior
     by_lines: Array
-    repeated: Array
+    repeatability_covariance: Array
 
     @property
     def value(self) -> Array:
@@ -281,8 +281,8 @@ class _Judgement:
         return self.found.covariance
 
     @classmethod
-    def of(cls, here: Estimate, believed: Priors, information: MarginalInformation) -> _Judgement:
-        known = believed.mixing.T @ information.known @ believed.mixing
+    def of(cls, here: Estimate, believed: Priors, information: MarginalInformation) -> _JointPosterior:
+        by_errors = believed.mixing.T @ information.matrix @ believed.mixing
         found = _posterior(believed, information)
         # The movement of a camera helps to tell a zoom from a move. That it has not moved is no measurement of where it
         # is: if the lenses are what they are said to be, lines alone have to determine it.
@@ -290,10 +290,10 @@ class _Judgement:
         for group in (group for block in believed.blocks for group in block):
             certainty[group.which] = np.maximum(certainty[group.which], group.certainty(1.0))
         certainty[believed.movements] = np.minimum(found.certainty[believed.movements], believed.free**-2)
-        by_lines = np.asarray(np.linalg.inv(known + np.diag(certainty)), dtype=float)
-        return cls(here, believed, found, by_lines, information.repeated)
+        by_lines = np.asarray(np.linalg.inv(by_errors + np.diag(certainty)), dtype=float)
+        return cls(here, believed, found, by_lines, information.repeatability_covariance)
 
-    def finished(
+    def to_refined_poses(
         self,
         memories: Sequence[CameraMemory | None],
         measured: Sequence[Measurements],
@@ -339,7 +339,7 @@ class _Judgement:
             seen,
             residual,
             covariance + np.outer(away, away),
-            Sigma.from_covariance(self.repeated[own, own]),
+            Sigma.from_covariance(self.repeatability_covariance[own, own]),
             zoom,
             None if zoom is None else moved(with_focal_length(camera, zoom.value), pose @ errors),
             ground_sigma=self._ground_sigma(camera, np.concatenate([pose, lens])),
@@ -430,14 +430,14 @@ class _Judgement:
 
     def _of_field(self, solved: Unknowns) -> list[Deviation]:
         first, free = POSE_NUMBERS * self.believed.unknowns.views, {p.name for p in solved.parameters}
-        told, care = [], careful_measurement(self.here.pitch)
+        deviations, care = [], careful_measurement(self.here.pitch)
         for at, parameter in enumerate(self.believed.unknowns.parameters, first):
             if isinstance(parameter, LensParameter) or parameter.name in free:
                 continue
             row = self.believed.mixing[at]
             value, sigma = float(row @ self.value), float(np.sqrt(row @ self.covariance @ row))
-            told.append(Deviation(None, parameter.name, value, sigma, care[parameter.name]))
-        return told
+            deviations.append(Deviation(None, parameter.name, value, sigma, care[parameter.name]))
+        return deviations
 
     def _parameter_uncertainty(self, number: int) -> ParameterUncertainty:
         """Return the uncertainty of a free parameter, `number` among the unknowns that were solved for."""

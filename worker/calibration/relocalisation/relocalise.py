@@ -247,14 +247,14 @@ def explains_nearly_as_well(other: Candidate, best: Candidate) -> bool:
     """True if another candidate may be the true one: it misses little more, and explains little less of the paint."""
     if other.agreement < best.agreement - LESS_AGREEMENT:
         return False
-    missed, its = (1 - one.evidence.agreement for one in (best, other))
+    missed, other_missed = (1 - one.evidence.agreement for one in (best, other))
     has_paint_of_its_own = share(other.explains & ~best.explains) > OWN_PAINT
     if not has_paint_of_its_own and _is_outdone(other, best):
         return False
     if other.explained <= best.explained and _is_less_exact(other, best):
         return False
     return (
-        its < MORE_MISSED * missed + FEW_MISSED
+        other_missed < MORE_MISSED * missed + FEW_MISSED
         or other.explained > best.explained + MORE_EXPLAINED
         # A pose that misses clearly more, and explains nothing beyond the best, is a worse reading of the same.
         or (has_paint_of_its_own and other.overlap.iou > RIVAL_OVERLAP * best.overlap.iou)

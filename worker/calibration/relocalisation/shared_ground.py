@@ -157,16 +157,16 @@ def _mean(values: NDArray[np.float32], counted: NDArray[np.bool_], cells: float)
 
 def _without_stripes(values: NDArray[np.float32], counted: NDArray[np.bool_]) -> NDArray[np.float32]:
     """Return the values less the means of rows and columns: stripes of mown grass look alike from many poses."""
-    left = np.where(counted, values, np.float32(0))
+    remaining = np.where(counted, values, np.float32(0))
     for axis in (0, 1):
-        mean = left.sum(axis=axis, keepdims=True) / np.maximum(counted.sum(axis=axis, keepdims=True), 1)
-        left = np.where(counted, left - mean.astype(np.float32), np.float32(0))
-    return left
+        mean = remaining.sum(axis=axis, keepdims=True) / np.maximum(counted.sum(axis=axis, keepdims=True), 1)
+        remaining = np.where(counted, remaining - mean.astype(np.float32), np.float32(0))
+    return remaining
 
 
 def _without_outliers(values: NDArray[np.float32]) -> Array:
     """Return the values around 0, none of them beyond `OUTLYING` deviations."""
     around = values - np.median(values)
     most = OUTLYING * float(np.median(np.abs(around))) / USUAL
-    held = np.clip(around, -most, most)
-    return np.asarray(held - held.mean(), float)
+    clipped = np.clip(around, -most, most)
+    return np.asarray(clipped - clipped.mean(), float)

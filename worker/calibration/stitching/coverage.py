@@ -34,5 +34,5 @@ def unseen_part(seen: NDArray[np.bool_]) -> Unseen:
         for name, cell in zip(names, np.array_split(band, 3, axis=1), strict=True)
     }
     total = sum(counts.values())
-    told = [name for name in sorted(counts, key=lambda name: -counts[name]) if counts[name] > LEAST_OF_UNSEEN * total]
-    return Unseen(total / seen.size, told)
+    places = [name for name in sorted(counts, key=lambda name: -counts[name]) if counts[name] > LEAST_OF_UNSEEN * total]
+    return Unseen(total / seen.size, places)

@@ -152,7 +152,7 @@ class _Track:
     def see(self, picture: PixelReader | None, seconds: float) -> None:
         """Take the next picture, so long after the one before; None: it is not looked at, or not there."""
         self.lines.forget(seconds)
-        expected = self._last.after(seconds).drawn_back(seconds)
+        expected = self._last.after(seconds).with_mast_prior(seconds)
         how, self._last = self._known(picture, expected)
         self._steps.append(FilterStep(seconds, self._last))
         self._how.append(how)
@@ -163,7 +163,7 @@ class _Track:
 
     def predicted(self, seconds: float) -> TrackedPose:
         """Return the pose so long after the last frame, with its uncertainty."""
-        return self._followed(self._last.after(seconds).drawn_back(seconds), self._how[-1])
+        return self._followed(self._last.after(seconds).with_mast_prior(seconds), self._how[-1])
 
     def oldest(self) -> TrackedPose:
         """Return the oldest pose that has not settled, smoothed by all frames so far, and forget it."""

@@ -230,8 +230,8 @@ class TrackedLines:
             weight = weigh(values - rows @ change)
             information = (rows * weight[:, None]).T @ rows
             change = np.asarray(np.linalg.solve(information + PRIOR, rows.T @ (weight * values)), float)
-        left = values - rows @ change
-        spread = self._spread(seen, rows * (weight * left)[:, None])
+        residual = values - rows @ change
+        spread = self._spread(seen, rows * (weight * residual)[:, None])
         together = float(np.trace(np.linalg.solve(information + PRIOR, spread))) / POSE_NUMBERS
         known = information / max(1.0, together)
         of_picture = np.diag(np.repeat([PICTURE_PX / seen.expected.intrinsics.focal_length_px, 0.0], 3) ** 2)
@@ -239,7 +239,7 @@ class TrackedLines:
             change_between(self.reference, moved(seen.expected, change)),
             np.asarray(np.linalg.solve(np.eye(POSE_NUMBERS) + known @ of_picture, known), float),
         )
-        return Sighting(every, observed, float(np.median(np.abs(left))))
+        return Sighting(every, observed, float(np.median(np.abs(residual))))
 
     def _known(self, seen: LineObservations) -> LineObservations:
         """Return the pieces that have been seen before, or all where those are too few.
@@ -253,13 +253,13 @@ class TrackedLines:
     def learn(self, sighting: Sighting, now: Camera) -> None:
         """Keep the offsets of the pieces from their places when the camera is where it is `now` known to be."""
         seen = sighting.seen
-        left = seen.offset - seen.jacobian @ change_between(seen.expected, now)
-        counted = tukey_weights((left - self._beside.mean[seen.piece]) / self._sigma(seen)) > 0
+        residual = seen.offset - seen.jacobian @ change_between(seen.expected, now)
+        counted = tukey_weights((residual - self._beside.mean[seen.piece]) / self._sigma(seen)) > 0
         which = seen.piece[counted]
         novelty = NOVELTY if self._usual else 1.0
         self._usual += (seen.share - self._usual) * novelty
         self._usual_misfit += (sighting.misfit - self._usual_misfit) * novelty
-        self._beside.learn(which, left[counted])
+        self._beside.learn(which, residual[counted])
 
     def forget(self, seconds: float) -> None:
         """Let what was learned of the pieces fade by the time that passes."""
@@ -269,9 +269,9 @@ class TrackedLines:
         """Return the standard deviation (M,) in px of the pieces' measurements and of their learned places."""
         return np.sqrt(NOISE_PX**2 + self._beside.variance[seen.piece])
 
-    def _spread(self, seen: LineObservations, pulls: Array) -> Array:
+    def _spread(self, seen: LineObservations, gradients: Array) -> Array:
         """Return the covariance (6, 6) of the sum of gradients (M, 6), those of a patch taken as one."""
         patches, patch = np.unique(self._patch[seen.piece], return_inverse=True)
         sums = np.zeros((len(patches), POSE_NUMBERS))
-        np.add.at(sums, patch, pulls)
+        np.add.at(sums, patch, gradients)
         return sums.T @ sums

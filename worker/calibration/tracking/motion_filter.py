@@ -64,7 +64,7 @@ class State:
         onward = _onward(seconds)
         return State(onward @ self.mean, onward @ self.covariance @ onward.T + _unforeseen(seconds))
 
-    def drawn_back(self, seconds: float) -> State:
+    def with_mast_prior(self, seconds: float) -> State:
         """Return the state with the prior of a mast over so long a time: next to nothing where lines are seen."""
         information = np.diag(np.repeat([BACK_RAD, BACK_M], 3) ** -2.0) * seconds
         return self.with_observed(PoseObservation(np.zeros(POSE_NUMBERS), information))

@@ -17,7 +17,7 @@ def filtered(changes, rng=None):
     steps = [FilterStep(0.0, last)]
     for change in changes:
         seen = change if rng is None else change + rng.normal(0, NOISE)
-        expected = last.after(FRAME_S).drawn_back(FRAME_S)
+        expected = last.after(FRAME_S).with_mast_prior(FRAME_S)
         last = expected.with_observed(PoseObservation(seen, INFORMATION))
         steps.append(FilterStep(FRAME_S, last))
     return steps
@@ -104,7 +104,7 @@ def test_a_rig_that_is_not_seen_for_long_is_somewhere_about_its_reference():
     state = filtered(swinging(100))[-1].known
     sigmas = []
     for _ in range(100):
-        state = state.after(FRAME_S).drawn_back(FRAME_S)
+        state = state.after(FRAME_S).with_mast_prior(FRAME_S)
         sigmas.append(np.sqrt(np.diag(state.change_covariance)))
     assert np.all(sigmas[12] > 10 * NOISE)
     assert np.all(np.degrees(sigmas[-1][:3]) < 1.5)
