@@ -35,8 +35,6 @@ PAINT = {
     "orange": (0.1, 0.5, 0.9),
 }
 """Reflectance (blue, green, red) of paint by its name, 0..1."""
-DEEP = 0.25
-"""Reflectance below which paint is hardly ever brighter than its ground in a channel; on ice anything can be darker."""
 CLEARLY = 0.2
 """Correlation by which another contrast has to be better than bright in green."""
 OPPOSES = 0.33
@@ -88,7 +86,8 @@ def possible_signs(colour: str, channel: int) -> tuple[int, ...]:
     """
     if colour == WHITE:
         return (1, -1)
-    return (-1,) if _reflectance(colour)[channel] < DEEP else (1, -1)
+    # Reflectance below which paint is hardly ever brighter than its ground in a channel; on ice anything can be darker.
+    return (-1,) if _reflectance(colour)[channel] < 0.25 else (1, -1)
 
 
 def _reflectance(colour: str) -> tuple[float, float, float]:

@@ -21,12 +21,6 @@ from worker.calibration.geometry.visibility import VisibleLines
 
 TOLERANCE_PX = 3.0
 """Distance from its expected place within which a line counts as found, in pixels of a 4K frame; 2 px at least."""
-CHANCE_REACH_PX = 40.0
-"""Distance to each side in which chance is given its tries, in pixels of a 4K frame; 24 px at least."""
-LEAST_BEYOND_CHANCE = 0.3
-"""Share of a marking that has to be found beyond chance for it to be seen, 0..1."""
-LEAST_LENGTH_PX = 15.0
-"""Least length of a marking for it to be seen: on less, chance is not rare enough."""
 LEAST_ROOM = 0.5
 """Least share that chance leaves to be found: where it finds more than the other half, finding the rest says nothing
 more."""
@@ -78,8 +72,10 @@ class Evidence:
     @property
     def is_seen(self) -> bool:
         """True if these pieces, of one marking, are found clearly more often than by chance."""
-        long_enough = self.weight.sum() >= LEAST_LENGTH_PX
-        return bool(long_enough and self.share - self.by_chance >= LEAST_BEYOND_CHANCE)
+        # Least length of a marking for it to be seen: on less, chance is not rare enough.
+        long_enough = self.weight.sum() >= 15.0
+        # Share of a marking that has to be found beyond chance for it to be seen, 0..1.
+        return bool(long_enough and self.share - self.by_chance >= 0.3)
 
 
 def _mean(values: Array | NDArray[np.bool_], weight: Array) -> float:
@@ -99,7 +95,8 @@ def evidence_of(
     `channels` of the frame; `response` (H, W) the segmentation in 0..1; `left_out` (H, W): where chance has no try.
     """
     scale = camera.intrinsics.relative_size
-    tolerance, reach = max(TOLERANCE_PX * scale, 2.0), max(CHANCE_REACH_PX * scale, 24.0)
+    # Distance to each side in which chance is given its tries, in pixels of a 4K frame; 24 px at least.
+    tolerance, reach = max(TOLERANCE_PX * scale, 2.0), max(40.0 * scale, 24.0)
     seen = VisibleLines.from_camera(lines, camera)
     parts = []
     for looked in match_lines(seen, channels, tolerance + reach, scale):

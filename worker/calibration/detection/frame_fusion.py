@@ -21,17 +21,8 @@ from worker.calibration.geometry.rotation import rotation_matrices
 
 Grey = NDArray[np.uint8]
 
-CORNERS, CORNER_QUALITY, CORNERS_APART_PX = 800, 0.005, 12
 FEWEST_FOLLOWED = 30
 """Fewest corners to be found again in a frame; with fewer it is taken for still."""
-BACK_AGAIN_PX = 0.3
-"""Largest distance between a corner and where it is found when it is followed to the other frame and back again."""
-STANDING_STILL_PX = 1.0
-"""Largest distance of a corner from a common motion for it to stand still."""
-OUTLIER = 3.0
-"""Standard deviations beyond which a corner is not counted."""
-LEAST_SWAY_PX = 0.05
-"""Shift below which a frame is left as it is."""
 GRID_PX = 32
 BAND_ROWS = 128
 
@@ -53,7 +44,8 @@ class Sway:
         camera = _at_origin(lens)
         shift = camera.project(camera.rays(grid.astype(float)) @ rotation_matrices(turn).T) - grid
         shift = np.nan_to_num(shift, nan=0.0, posinf=0.0, neginf=0.0)
-        return cls(shift.astype(np.float32) if np.abs(shift).max() > LEAST_SWAY_PX else None)
+        # Shift below which a frame is left as it is.
+        return cls(shift.astype(np.float32) if np.abs(shift).max() > 0.05 else None)
 
     def rows(self, picture: NDArray[np.uint8], top: int, bottom: int) -> NDArray[np.uint8]:
         """Return rows of the still view (bottom - top, W), resampled from the frame's `picture` (H, W)."""
@@ -73,7 +65,7 @@ def sways(frames: Sequence[Frame], lens: Lens) -> list[Sway]:
     if len(frames) == 1:
         return [Sway(None)]
     first = _grey(frames[0])
-    corners = cv2.goodFeaturesToTrack(first, CORNERS, CORNER_QUALITY, CORNERS_APART_PX)
+    corners = cv2.goodFeaturesToTrack(first, 800, 0.005, 12)
     turns = np.zeros((len(frames), 3))
     if corners is not None:
         there = np.asarray(corners, dtype=np.float32)
@@ -110,7 +102,7 @@ def _turn(first: Grey, later: Grey, corners: NDArray[np.floating], lens: Lens) -
     for _ in range(2):
         turn = np.linalg.lstsq(jacobian[counted].reshape(-1, 3), (after - before)[counted].ravel(), rcond=None)[0]
         off = np.linalg.norm(after - before - jacobian @ turn, axis=1)
-        counted &= off <= OUTLIER * np.sqrt(np.mean(off[counted] ** 2))
+        counted &= off <= 3.0 * np.sqrt(np.mean(off[counted] ** 2))
     return np.asarray(turn, dtype=float)
 
 
@@ -119,10 +111,12 @@ def _standing_still(first: Grey, later: Grey, corners: NDArray[np.floating]) -> 
     there, found, _ = cv2.calcOpticalFlowPyrLK(first, later, corners, np.empty_like(corners))
     back, found_again, _ = cv2.calcOpticalFlowPyrLK(later, first, there, np.empty_like(corners))
     followed = (np.asarray(found, dtype=bool) & np.asarray(found_again, dtype=bool)).ravel()
-    followed &= np.linalg.norm(back - corners, axis=-1).ravel() < BACK_AGAIN_PX
+    # Largest distance between a corner and where it is found when it is followed to the other frame and back again.
+    followed &= np.linalg.norm(back - corners, axis=-1).ravel() < 0.3
     before, after = corners[followed].reshape(-1, 2), there[followed].reshape(-1, 2)
     if len(before) >= FEWEST_FOLLOWED:
-        _, still = cv2.estimateAffinePartial2D(before, after, ransacReprojThreshold=STANDING_STILL_PX)
+        # Largest distance of a corner from a common motion for it to stand still.
+        _, still = cv2.estimateAffinePartial2D(before, after, ransacReprojThreshold=1.0)
         together = np.zeros(len(before), dtype=bool) if still is None else still.ravel() > 0
         before, after = before[together], after[together]
     return before.astype(float), after.astype(float)

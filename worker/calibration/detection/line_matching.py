@@ -43,8 +43,6 @@ GRID_PX = 16.0
 """Spacing of the fixed points of the picture from which sampling places are counted."""
 TOGETHER_PX = 40.0
 """Length of line, in pixels of a 4K frame, over which a ridge has to go on to be one."""
-LUMA_WEAKER = 0.05
-"""Mean correlation by which a marking may stand out less in luma than in green and still be read in luma."""
 LEAST_ALONG = 0.5
 """Mean correlation with the expected profile, over `TOGETHER_PX`, from which a ridge is a line by itself."""
 
@@ -126,7 +124,8 @@ def known_contrasts(seen: VisibleLines, channels: Channels, reach_px: float, rel
     by_luma = _strengths(in_luma, seen)
     contrasts = np.array(CONTRASTS)[chosen]
     of_marking = np.arange(len(chosen))
-    as_well = by_luma[chosen, of_marking] >= strength[chosen, of_marking] - LUMA_WEAKER
+    # Mean correlation by which a marking may stand out less in luma than in green and still be read in luma.
+    as_well = by_luma[chosen, of_marking] >= strength[chosen, of_marking] - 0.05
     contrasts[as_well & (contrasts[:, 0] == GREEN), 0] = LUMA
     return contrasts
 

@@ -34,20 +34,7 @@ CORRELATION = (0.55, 0.65)
 
 Every limit is a ramp: with a step, a measurement beside it would come and go as the pose moves by a hair.
 """
-RESPONSE = (0.25, 0.35)
-"""Network probability of a marking from which a measurement counts at all, and in full."""
-ALONG = (LEAST_ALONG - 0.05, LEAST_ALONG + 0.05)
-"""Mean correlation along the line from which a measurement counts at all, and in full: the larger of `RESPONSE` and
-this decides."""
-SEARCH_EDGE_PX, PICTURE_EDGE_PX = 1.0, 2.0
-"""Lengths over which a measurement fades towards the end of the search, and towards the border of the picture."""
 CENTRE_STEPS = 2
-MOST_UPHILL = 8
-"""Most sampling steps from the match that is preferred for lying near to where the line is expected to the best match
-beside it: where a line is measured does not depend on where it is expected."""
-RIDGE = 1e-6
-OFF_CENTRE_PENALTY = 0.15
-"""Correlation that a candidate at the end of the search loses against one where the pose expects the line."""
 NOISE_PX = 0.2
 """Standard deviation of one measurement of a perfect line."""
 PAINT_M = 0.006
@@ -209,7 +196,8 @@ class LineProfiles:
         matches = centred.matches
         shifts = matches.base[:, None] + matches.shifts
         beside = np.abs(shifts - expected[:, None])
-        preference = matches.correlation - OFF_CENTRE_PENALTY * (beside / search_px) ** 2
+        # A candidate at the end of the search loses so much correlation against one where the pose expects the line.
+        preference = matches.correlation - 0.15 * (beside / search_px) ** 2
         preference[~(beside <= search_px + matches.sampling_px)] = -np.inf
         best = _peaks(matches.correlation, np.argmax(preference, axis=1))
         every = np.arange(len(best))
@@ -218,14 +206,16 @@ class LineProfiles:
         best, seen = best[row], self._seen[matches.which[row]]
         shift = shifts[row, best] + centred.at(row, best)
         pixel = seen.pixel + shift[:, None] * seen.normal
-        marking = _ramp(matches.along[row, best], *ALONG)
+        marking = _ramp(matches.along[row, best], LEAST_ALONG - 0.05, LEAST_ALONG + 0.05)
         if self._response is not None:
-            marking = np.maximum(marking, _ramp(bilinear(self._response, pixel), *RESPONSE))
+            # Network probability of a marking from which a measurement counts at all, and in full.
+            marking = np.maximum(marking, _ramp(bilinear(self._response, pixel), 0.25, 0.35))
+        # It fades towards the end of the search, and towards the border of the picture.
         trust = (
             marking
             * _ramp(matches.correlation[row, best], *CORRELATION)
-            * _ramp(search_px - np.abs(shift - expected[row]), 0.0, SEARCH_EDGE_PX)
-            * _ramp(self._to_border(seen, shift, matches), 0.0, PICTURE_EDGE_PX)
+            * _ramp(search_px - np.abs(shift - expected[row]), 0.0, 1.0)
+            * _ramp(self._to_border(seen, shift, matches), 0.0, 2.0)
         )
         good = trust > 0
         return matches.which[row[good]], shift[good], trust[good]
@@ -274,7 +264,9 @@ def _peaks(values: Array, begun: NDArray[np.intp]) -> NDArray[np.intp]:
     """Return the columns (N,) of the local maxima in rows of values (N, S) that lie uphill of columns `begun` (N,)."""
     rows, last, height = np.arange(len(values)), values.shape[1] - 1, without_nan(values, -np.inf)
     here = begun
-    for _ in range(MOST_UPHILL):
+    # Most sampling steps from the match that is preferred for lying near to where the line is expected to the best
+    # match beside it: where a line is measured does not depend on where it is expected.
+    for _ in range(8):
         around = np.clip(here + np.array([[0], [-1], [1]]), 0, last)
         higher = np.argmax(height[rows, around], axis=0)
         if not higher.any():
@@ -304,7 +296,7 @@ def _centre(windows: Array, width_px: Array, offsets: Array, reach_px: float) ->
         first, second = blurred_step(edges, LENS_BLUR_PX)
         model[:, 0], model[:, 1], model[:, 2], model[:, 3] = 1 - first, first - second, second, move
         model *= inside[:, None]
-        normal = np.einsum("nak,nbk->nab", model, model) + RIDGE * np.eye(4)
+        normal = np.einsum("nak,nbk->nab", model, model) + 1e-6 * np.eye(4)
         before, paint, behind, by = np.linalg.solve(normal, np.einsum("nak,nk->na", model, windows)[..., None])[
             ..., 0
         ].T

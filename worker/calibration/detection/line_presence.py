@@ -24,22 +24,8 @@ NEAR_PX = 12
 """Largest distance of a line from the common shift: a turn bends what it shifts, and the place may be off as well."""
 AGREED_PX = 2.5
 """Largest difference between the offsets of two neighbours on one line."""
-STANDS_OUT = 1.6
-"""Ratio of a line's strength to that of chance beside it."""
-LOCALLY, SQUARE_PX = 1.3, 120
-"""Ratio of a line's strength to that of chance in its square of the picture, and the side of that: nets, patterns and
-lettering are streaks as well."""
 ROLLS_RAD = (-0.03, 0.0, 0.03)
 """Turns about the middle that are tried with each shift."""
-MOST_TRIED = 120
-"""Most places on lines that are used to find the shift."""
-SATURATION, HALF_SURE = 20.0, 10.0
-"""Contrast of a streak above which it counts no more, and at which it is half a line."""
-FAR_COSTS = 0.05
-"""Score that the farthest shift loses: of two shifts that are as good, the nearer one is taken."""
-SETTLING_STEPS, ROBUST_STEPS = 2, 4
-HELD = 20.0
-"""Prior weight of no movement, so that a handful of lines does not turn the picture."""
 
 
 @dataclass(frozen=True)
@@ -61,9 +47,10 @@ def look_for_lines(picture: Frame, lines: VisibleLines, reach_px: float) -> Line
         return LinesInSight(np.empty((0, 2)), np.empty(0, dtype=bool), np.empty(0))
     streaks = Streaks.of(picture)
     at: Array = lines.pixel + _common_shift(streaks, lines, reach_px)
-    for _ in range(SETTLING_STEPS):
+    for _ in range(2):
         offset, contrast, found = _match(streaks, lines, at)
-        at = at + _movement(at, lines.normal, offset, np.where(found, np.minimum(contrast, SATURATION), 0.0))
+        # More contrast counts no more.
+        at = at + _movement(at, lines.normal, offset, np.where(found, np.minimum(contrast, 20.0), 0.0))
     _, contrast, found = _match(streaks, lines, at)
     return LinesInSight(at, found, contrast)
 
@@ -78,14 +65,16 @@ def _match(streaks: Streaks, lines: VisibleLines, at: Array) -> tuple[Array, Arr
     best = near.argmax(axis=1)
     contrast = near[np.arange(len(near)), best]
     chance = np.mean([strength.max(axis=1) for strength in beside], axis=0)
-    usual = np.maximum(LEAST_CONTRAST, STANDS_OUT * np.median(chance))
-    found = (contrast >= np.maximum(usual, LOCALLY * _of_neighbours(at, chance))) & _agreeing(steps[best], lines)
+    # A line stands out by so much from chance beside it in all of the picture, and in its square of it: nets, patterns
+    # and lettering are streaks as well.
+    usual = np.maximum(LEAST_CONTRAST, 1.6 * np.median(chance))
+    found = (contrast >= np.maximum(usual, 1.3 * _of_neighbours(at, chance))) & _agreeing(steps[best], lines)
     return steps[best].astype(float), contrast, found
 
 
 def _of_neighbours(at: Array, values: Array) -> Array:
     """Return the median (N,) of values (N,) in the same square of the picture."""
-    square = np.unique(np.floor(at / SQUARE_PX).astype(int), axis=0, return_inverse=True)[1].ravel()
+    square = np.unique(np.floor(at / 120).astype(int), axis=0, return_inverse=True)[1].ravel()
     return np.array([np.median(values[square == number]) for number in range(square.max() + 1)])[square]
 
 
@@ -98,8 +87,9 @@ def _movement(at: Array, normal: Array, offset: Array, weight: Array) -> Array:
         [np.broadcast_to([1.0, 0.0], at.shape), np.broadcast_to([0.0, 1.0], at.shape), turn, middle / size]
     )
     across = np.einsum("kni,ni->nk", moves, normal)
-    for _ in range(ROBUST_STEPS):
-        system = (across * weight[:, None]).T @ across + HELD * np.diag([1.0, 1.0, 1.0, 3.0])
+    for _ in range(4):
+        # Prior weight of no movement, so that a handful of lines does not turn the picture.
+        system = (across * weight[:, None]).T @ across + 20.0 * np.diag([1.0, 1.0, 1.0, 3.0])
         by = np.linalg.solve(system, across.T @ (weight * offset))
         weight = weight / (1 + ((offset - across @ by) / AGREED_PX) ** 2)
     return np.einsum("kni,k->ni", moves, by)
@@ -117,12 +107,15 @@ def _common_shift(streaks: Streaks, lines: VisibleLines, reach_px: float) -> Arr
     steps = COARSE_PX * np.arange(-int(reach_px // COARSE_PX), int(reach_px // COARSE_PX) + 1)
     shifts = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
     wide = streaks.widened(COARSE_PX)
-    few = lines[np.linspace(0, len(lines) - 1, min(MOST_TRIED, len(lines))).astype(np.intp)]
-    far = FAR_COSTS * np.hypot(*shifts.T) / max(reach_px, 1.0)
+    # Most places on lines that are used to find the shift.
+    few = lines[np.linspace(0, len(lines) - 1, min(120, len(lines))).astype(np.intp)]
+    # Of two shifts that are as good, the nearer one is taken.
+    far = 0.05 * np.hypot(*shifts.T) / max(reach_px, 1.0)
     scores = []
     for roll in ROLLS_RAD:
         evidence = wide.read(few, (few.pixel + _turned(few.pixel, lines.pixel, roll))[:, None] + shifts)
-        scores.append((evidence / (evidence + HALF_SURE)).mean(axis=0) - far)
+        # A streak of this contrast is half a line.
+        scores.append((evidence / (evidence + 10.0)).mean(axis=0) - far)
     roll, best = divmod(int(np.argmax(scores)), len(shifts))
     return shifts[best] + _turned(lines.pixel, lines.pixel, ROLLS_RAD[roll])
 

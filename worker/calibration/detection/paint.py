@@ -16,25 +16,13 @@ from numpy.typing import NDArray
 from worker.calibration.detection.segmentation import Region
 from worker.calibration.geometry.camera import Array, Frame
 
-LOOKED_AT_WIDTH_PX = 640
-"""Width of the reduced picture in which the ground is estimated: lines are thin there."""
-GROUND_PX = 21
-"""Side of the square whose median is the ground, px at that width: more than twice as wide as any line."""
-DARK = 4.0
-"""Grey levels added to all brightness: what is black anyway has no colour."""
-LEAST_DIFFERENCE = 0.25
-"""The least difference of a line from its ground, as a share of the ground's brightness, whose colour is read off."""
 MOST_COLOURS = 8
 """Number of clusters into which the colours that stand out are sorted. Halls have up to six paints; one that shines, or
 that another line touches, has two."""
-LEAST_PART = 0.03
-"""The least part of all that stands out from the ground which a paint of lines has."""
 SPREAD_RAD = 0.2
 """Spread of the colours of one paint, as an angle between differences: white and yellow on blue are 0.26 apart."""
 FAINTEST = 0.15
 """The share of a paint below which a pixel shows none: noise, and edges of other lines."""
-GROUND_LEVEL, PAINT_LEVEL = 60.0, 140.0
-"""Grey levels of the ground, and by how much paint is brighter, where only some colours are drawn."""
 ROWS = 256
 """Rows of a frame that are processed at once: a frame of 4K would take 400 MB as numbers."""
 
@@ -55,7 +43,8 @@ def sort_colours(frames: Sequence[Frame], regions: Sequence[Sequence[Region]]) -
     for group in sorted((seen[labels == label] for label in range(MOST_COLOURS)), key=len, reverse=True):
         colour = np.median(group, axis=0)
         # Clusters cut a paint in two where it is most of all that is seen.
-        if len(group) >= LEAST_PART * len(seen) and all(_angle(colour, other) > SPREAD_RAD for other in colours):
+        # Clusters of noise are smaller.
+        if len(group) >= 0.03 * len(seen) and all(_angle(colour, other) > SPREAD_RAD for other in colours):
             colours.append(colour)
     return np.array(colours)
 
@@ -80,7 +69,8 @@ def draw_colours(frame: Frame, colours: Array, chosen: Sequence[int]) -> Frame:
         share = np.clip(along / sizes.astype(np.float32), 0.0, 1.0)
         shown = (belongs * share)[..., list(chosen)].sum(axis=-1)
         shown = np.clip((shown - FAINTEST) / (1 - FAINTEST), 0.0, 1.0)
-        drawn[rows] = (GROUND_LEVEL + PAINT_LEVEL * shown)[..., None]
+        # Grey levels of the ground, and by how much paint is brighter.
+        drawn[rows] = (60.0 + 140.0 * shown)[..., None]
     return drawn
 
 
@@ -94,17 +84,22 @@ def _colours_of_lines(frame: Frame, regions: Sequence[Region]) -> NDArray[np.flo
     for rows, difference in _differences(frame):
         size = np.linalg.norm(difference, axis=-1)
         peak = size >= cv2.dilate(size, np.ones((3, 3), np.uint8))
-        colours.append(difference[peak & (size > LEAST_DIFFERENCE) & looked_at[rows]])
+        # The least difference of a line from its ground, as a share of the ground's brightness, whose colour is read
+        # off.
+        colours.append(difference[peak & (size > 0.25) & looked_at[rows]])
     return np.concatenate(colours)
 
 
 def _differences(frame: Frame) -> Iterator[tuple[slice, NDArray[np.float32]]]:
     """Yield rows of a frame, and how their pixels (h, W, 3) differ from the ground, as shares of its brightness."""
     height, width = frame.shape[:2]
-    factor = max(1, round(width / LOOKED_AT_WIDTH_PX))
+    # Width of the reduced picture in which the ground is estimated: lines are thin there.
+    factor = max(1, round(width / 640))
     small = cv2.resize(frame, (width // factor, height // factor), interpolation=cv2.INTER_AREA)
-    ground = cv2.resize(cv2.medianBlur(small, GROUND_PX), (width, height), interpolation=cv2.INTER_LINEAR)
+    # Side of the square whose median is the ground, px at that width: more than twice as wide as any line.
+    ground = cv2.resize(cv2.medianBlur(small, 21), (width, height), interpolation=cv2.INTER_LINEAR)
     for top in range(0, height, ROWS):
         rows = slice(top, min(top + ROWS, height))
-        pixels, there = (np.asarray(part[rows], dtype=np.float32) + np.float32(DARK) for part in (frame, ground))
+        # Grey levels added to all brightness: what is black anyway has no colour.
+        pixels, there = (np.asarray(part[rows], dtype=np.float32) + np.float32(4.0) for part in (frame, ground))
         yield rows, pixels / there - 1

@@ -16,12 +16,6 @@ from worker.calibration.geometry.visibility import VisibleLines
 
 WORKING_PX = 960
 """Columns of the reduced picture in which streaks are looked for."""
-SURROUNDINGS_PX = 121
-"""Side of the square of the reduced picture whose mean streak is the usual one: texture is full of streaks."""
-STANDS_OUT = 2.0
-"""Ratio to the usual from which a streak may be a line; one of twice that is called one for sure."""
-DIRECTIONS_APART = 0.75
-"""Largest angle between a streak and a line, in steps between two directions."""
 MASK_PX = 8
 """Side of the squares of the mask of where lines can be."""
 
@@ -39,7 +33,8 @@ def ridge_response(channels: Channels, lines: VisibleLines, reach_px: float) -> 
     for number in range(DIRECTIONS):
         apart = np.abs((direction - number + DIRECTIONS / 2) % DIRECTIONS - DIRECTIONS / 2)
         for which in range(LEVELS):
-            expected = (level == which) & (apart <= DIRECTIONS_APART)
+            # Largest angle between a streak and a line, in steps between two directions.
+            expected = (level == which) & (apart <= 0.75)
             if expected.any():
                 near = _within(lines.pixel[expected] * scale, reach_px * scale, size)
                 likely = cv2.resize(_likelihood(streaks.strength[which][number], which), size)
@@ -49,9 +44,11 @@ def ridge_response(channels: Channels, lines: VisibleLines, reach_px: float) -> 
 
 def _likelihood(strength: NDArray[np.uint8], level: int) -> NDArray[np.float32]:
     """Return the likelihood (h, w), 0..1, that streaks of a level are lines, beside what is usual around them."""
-    side = SURROUNDINGS_PX // 2**level | 1
+    # A streak is compared with the mean of its surroundings: texture is full of streaks.
+    side = 121 // 2**level | 1
     values = strength.astype(np.float32)
-    usual = np.maximum(STANDS_OUT * cv2.blur(values, (side, side)), LEAST_CONTRAST)
+    # Twice the usual may be a line; four times is one for sure.
+    usual = np.maximum(2.0 * cv2.blur(values, (side, side)), LEAST_CONTRAST)
     return np.asarray(np.clip(values / usual - 1, 0, 1), dtype=np.float32)
 
 

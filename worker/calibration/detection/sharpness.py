@@ -8,18 +8,9 @@ from numpy.typing import NDArray
 
 from worker.calibration.geometry.camera import Array, Frame
 
-STEEPEST_OF_A_CELL_PX = 16
-"""Side of the squares of the small picture from which one edge each is taken, so that no caption decides."""
-LEAST_STEP = 14.0
-"""Least height of an edge, of 255: fainter ones drown in noise and texture."""
 FEWEST_EDGES = 12
-MOST_EDGES = 200
-SHARP_SHARE = 0.3
-"""Quantile of the edges' blur that is the picture's: shadows and grass have soft edges in a sharp picture too."""
 REACH = 14
 """Steps of a profile to either side of an edge."""
-FADED = 0.15
-"""Slope at which an edge ends, as a part of that at its steepest place."""
 
 
 def edge_blur_px(frame: Frame, small: NDArray[np.uint8], where: NDArray[np.bool_]) -> float | None:
@@ -35,12 +26,14 @@ def edge_blur_px(frame: Frame, small: NDArray[np.uint8], where: NDArray[np.bool_
     # A profile that is right for a sharp edge is too short for a smeared one, and the other way round.
     for step in (scale / 4, scale, 3 * scale):
         width, height, inner = _edges(_profiles(frame, (pixel + 0.5) * scale - 0.5, direction, step))
-        good = (height >= LEAST_STEP) & inner
+        # Least height of an edge, of 255: fainter ones drown in noise and texture.
+        good = (height >= 14.0) & inner
         widths.append(np.where(good, width * step, np.nan))
     known = np.stack(widths)
     first = np.take_along_axis(known, np.argmax(np.isfinite(known), axis=0)[None], axis=0)[0]
     first = first[np.isfinite(first)]
-    return float(np.quantile(first, SHARP_SHARE)) if len(first) >= FEWEST_EDGES else None
+    # Quantile of the edges' blur that is the picture's: shadows and grass have soft edges in a sharp picture too.
+    return float(np.quantile(first, 0.3)) if len(first) >= FEWEST_EDGES else None
 
 
 def _steep_places(small: NDArray[np.uint8], where: NDArray[np.bool_]) -> tuple[Array, Array]:
@@ -48,12 +41,13 @@ def _steep_places(small: NDArray[np.uint8], where: NDArray[np.bool_]) -> tuple[A
     smooth = cv2.GaussianBlur(small, (0, 0), 1.2).astype(np.float32)
     right, down = cv2.Sobel(smooth, cv2.CV_32F, 1, 0), cv2.Sobel(smooth, cv2.CV_32F, 0, 1)
     steep = cv2.magnitude(right, down) * where
-    cell = STEEPEST_OF_A_CELL_PX
+    # Side of the squares of the small picture from which one edge each is taken, so that no caption decides.
+    cell = 16
     rows, columns = small.shape[0] // cell, small.shape[1] // cell
     squares = steep[: rows * cell, : columns * cell].reshape(rows, cell, columns, cell).swapaxes(1, 2)
     blocks = squares.reshape(rows * columns, -1)
     best = blocks.argmax(axis=1)
-    strongest = np.argsort(-blocks[np.arange(len(blocks)), best])[:MOST_EDGES]
+    strongest = np.argsort(-blocks[np.arange(len(blocks)), best])[:200]
     row = strongest // columns * cell + best[strongest] // cell
     column = strongest % columns * cell + best[strongest] % cell
     slope = np.stack([right[row, column], down[row, column]], axis=1).astype(float)
@@ -90,7 +84,8 @@ def _edges(profiles: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
     steepest = slope.argmax(axis=1)
     peak = slope.max(axis=1)
     row = np.arange(len(slope))
-    rising = slope > FADED * peak[:, None]
+    # Slope at which an edge ends, as a part of that at its steepest place.
+    rising = slope > 0.15 * peak[:, None]
     # From the steepest place outwards, as long as it rises.
     index = np.arange(slope.shape[1])
     after = np.where(~rising & (index > steepest[:, None]), index, slope.shape[1]).min(axis=1)

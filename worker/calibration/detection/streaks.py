@@ -15,8 +15,6 @@ DIRECTIONS = 8
 """Number of directions in which streaks are looked for; between two of them little is lost."""
 BESIDE_PX = 3
 """Distance from the middle of a streak at which its surroundings are read."""
-WIDEST_PX = 2.5
-"""Widest lines of a level; wider ones are looked for in a picture half as large, or again half of that."""
 LEVELS = 3
 ALONG_PX = 3
 """Length, to either side, over which a streak is averaged."""
@@ -98,7 +96,8 @@ def _moved(padded: NDArray[np.uint8], by: NDArray[np.intp], border: int) -> NDAr
 
 def level_of(width_px: Array) -> NDArray[np.intp]:
     """Return the level (N,) in which lines of a width (N,) are looked for."""
-    return np.clip(np.ceil(np.log2(np.maximum(width_px, 1e-3) / WIDEST_PX)), 0, LEVELS - 1).astype(np.intp)
+    # Widest lines of a level; wider ones are looked for in a picture half as large, or again half of that.
+    return np.clip(np.ceil(np.log2(np.maximum(width_px, 1e-3) / 2.5)), 0, LEVELS - 1).astype(np.intp)
 
 
 def direction_of(normal: Array) -> NDArray[np.intp]:

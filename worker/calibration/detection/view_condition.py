@@ -31,31 +31,14 @@ OF_THE_GROUND: tuple[Spoiled, ...] = ("fogged", "snow", "blocked")
 Cause = Spoiled | Literal["other-camera", "no-markings-in-view"]
 Mask = NDArray[np.bool_]
 
-LOOKED_AT_PX = 960
-"""Columns of the reduced picture on which all but the sharpness is judged."""
 CELLS = 40
 """Columns of squares in which the picture is judged."""
-REACH_RAD = 0.1
-"""Largest error of a stored pose."""
-NARROWEST_PX = 0.5
-"""Narrowest lines in the reduced picture that are used, unless there are hardly others."""
-SPACING_PX = 8.0
-"""Distance between two places on a line that are examined."""
 FEWEST_PLACES, FEWEST_CELLS = 20, 12
 """Fewest places on lines, and fewest cells of the field, for a judgement."""
 
-FINEST_PX, COARSEST_PX = 1.5, 31
-"""Limits of the scale of structure: coarser than noise, finer than shading."""
-NEAR_CELLS, FAR_CELLS = 2.0, 6.0
-"""Standard deviations of the surroundings of a cell in which its lines are counted, and of the farther ones for cells
-without lines."""
-PRIOR_PLACES = 1.0
-"""Weight of what is known from farther around, in places on lines."""
 NOISE_ROWS = 16
 """Step between the rows of the frame in which the noise is measured."""
 
-LOST, MOSTLY = 0.3, 0.5
-"""Share of expected lines found below which lines are lost, and share of a place that has to be lost."""
 LEAST_SPOILED = 0.2
 """Share of the visible field below which dark, fog or snow leave a view usable."""
 LEAST_HIDDEN = 0.25
@@ -64,35 +47,14 @@ BLIND = 0.12
 """Share of the visible field that may be blown out where the sun blinds: the veil around it takes the rest."""
 LEAST_LIGHT = 16.0
 """Least brightness of the field, of 255, in the brightest channel."""
-LEAST_LIGHT_OVER_NOISE = 2.0
 DIM = 60.0
 """Brightness above which noise never hides the lines of a field."""
-BLOWN_OUT = 245
-"""Darkest channel from which a pixel is blown out."""
-PALE = 0.15
-"""Saturation under which a place may be fog or snow."""
-FOG_IS_BRIGHTER, SNOW_IS_BRIGHTER, SURELY_SNOW = 70.0, 165.0, 230.0
-"""Darkest channel of fog, which lifts the black; brightness of snow; and brightness that fog never has."""
-FLAT, NEARLY_FLAT = 2.0, 4.0
-"""Structure (grey levels) of a place that shows nothing, and of one that shows little; fallen snow varies more."""
 MOST_BLUR_PX = 3.5
 """Largest blur of a lens in focus, in pixels of a frame of 1920 columns; sharp lenses show 0.3 to 1.7."""
-SOFT_PX = 1.2
-"""Blur below which edges are in focus, in pixels of a frame of 1920 columns."""
-BLUR_OF_USUAL = 3.0
 LEAST_UNUSUAL_BLUR_PX = 2.2
-"""Blur (px of a frame of 1920 columns) from which a view is out of focus if it has `BLUR_OF_USUAL` times the camera's
-usual blur."""
-GOOD_LINES, OF_USUAL_LINES = 0.5, 0.4
-"""Share of the places on lines that a view surely has when it sees lines; and of that, the share that is left where it
-sees none."""
-OTHER_TINT, OTHER_LIGHT, OTHER_STRUCTURE, OTHER_BLUR = 0.06, 3.5, 2.5, 1.5
-"""Differences by which an obstacle differs from visible ground: in a channel's share, in light, in structure, in
-sharpness. A hard shadow has the ground's tint and seldom less than a third of its light."""
+"""Least blur of a view out of focus by comparison with its usual blur, in pixels of a frame of 1920 columns."""
 PLAIN, PATTERNED = 0.7, 5.0
 """Structure below which nothing is a ground, and above which nothing is a smeared one."""
-MOST_PATTERNED = 0.05
-"""Largest share of cells without lines that may have more structure than `PATTERNED` in fog."""
 
 
 @dataclass(frozen=True)
@@ -143,14 +105,16 @@ def look_at(frame: Frame, pitch: Field, camera: Camera, usual: UsualView | None 
     `usual`: figures of the camera's last accepted job, which tell a soft lens from one out of focus and a field of
     faint lines from one that is hidden.
     """
-    scale = LOOKED_AT_PX / camera.intrinsics.size[0]
+    # Columns of the reduced picture on which all but the sharpness is judged.
+    scale = 960 / camera.intrinsics.size[0]
     reduced = camera.with_lens(camera.intrinsics.scaled(scale))
     small = np.asarray(cv2.resize(frame, reduced.intrinsics.size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
     grey = np.asarray(cv2.cvtColor(small, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
     lines = _expected_lines(pitch, reduced)
     ground = _Ground.of(pitch, reduced)
     cells = _Cells.of(small, ground.size)
-    sight = look_for_lines(small, lines, REACH_RAD * reduced.intrinsics.focal_length_px)
+    # A stored pose may be off by so much.
+    sight = look_for_lines(small, lines, 0.1 * reduced.intrinsics.focal_length_px)
     lost = ground.field & _lost(sight, ground)
     noise = _noise(frame, ground.field)
     sharpness = _Sharpness.of(frame, grey, ground.field, lost)
@@ -170,7 +134,7 @@ def look_at(frame: Frame, pitch: Field, camera: Camera, usual: UsualView | None 
 def least_light(noise: float, least: float = LEAST_LIGHT) -> float:
     """Return the least brightness (0..255) of a field, at least `least`, that shows its lines through the `noise` of a
     pixel."""
-    return max(least, LEAST_LIGHT_OVER_NOISE * noise)
+    return max(least, 2.0 * noise)
 
 
 def _cause(
@@ -196,7 +160,7 @@ def _cause(
         if spoiled["veiled"].sum() < spoiled["white"].sum():
             return "snow", pale
         # Fog takes the contrast of edges and leaves their width, and nothing stands out of it.
-        if not smeared and (cells.structure[lost] > PATTERNED).mean() < MOST_PATTERNED:
+        if not smeared and (cells.structure[lost] > PATTERNED).mean() < 0.05:
             return "fogged", pale
     if figures.hidden >= LEAST_HIDDEN and _is_blocked(cells, field, lost, sharpness, smeared, figures, usual):
         return "blocked", lost
@@ -218,7 +182,9 @@ def _is_blocked(
         return False
     structure = np.median(cells.structure[lost])
     before = usual.lines_found if usual is not None and usual.lines_found is not None else 0.0
-    gone = before > GOOD_LINES and figures.lines_found < OF_USUAL_LINES * before
+    # Share of the lines that a view surely has when it sees lines; and of that, the share that is left where it sees
+    # none.
+    gone = before > 0.5 and figures.lines_found < 0.4 * before
     if clear.sum() >= FEWEST_CELLS:
         # A shadow differs as well, but what lies in it is as sharp as the rest, and most of its lines are still seen.
         near = sharpness.of_lost is None or structure < PLAIN or sharpness.differs
@@ -226,7 +192,8 @@ def _is_blocked(
     if sharpness.of_all is None or (structure < PLAIN and not smeared):
         return True
     # Right before the lens things are out of focus; of a field out of focus no such contrast is left.
-    if structure > PATTERNED and sharpness.of_all > SOFT_PX * sharpness.size:
+    # Blur below which edges are in focus, in pixels of a frame of 1920 columns.
+    if structure > PATTERNED and sharpness.of_all > 1.2 * sharpness.size:
         return True
     return gone and not smeared
 
@@ -236,17 +203,19 @@ def _differ(cells: _Cells, one: Mask, other: Mask) -> bool:
     tint = float(np.abs(a / max(a.sum(), 1.0) - b / max(b.sum(), 1.0)).max())
     light = abs(np.log(max(a.sum(), 1.0) / max(b.sum(), 1.0)))
     structure = abs(np.log(max(np.median(cells.structure[one]), 0.3) / max(np.median(cells.structure[other]), 0.3)))
-    return bool(tint > OTHER_TINT or light > np.log(OTHER_LIGHT) or structure > np.log(OTHER_STRUCTURE))
+    # A hard shadow has the ground's tint and seldom less than a third of its light.
+    return bool(tint > 0.06 or light > np.log(3.5) or structure > np.log(2.5))
 
 
 def _spoiled(cells: _Cells, field: Mask, lost: Mask, noise: float) -> dict[str, Mask]:
     """Return the cells of the field that show each defect and have no lines, by the names of `ViewFigures`."""
     dim = cells.brightest < min(least_light(noise), DIM)
     blown = cells.blown > 0.5
-    pale = (cells.saturation < PALE) & (cells.darkest > FOG_IS_BRIGHTER) & ~blown
-    rough = (cells.structure > FLAT) & (cells.brightest > SNOW_IS_BRIGHTER)
-    white = pale & (rough | (cells.brightest > SURELY_SNOW))
-    veiled = pale & (cells.structure < NEARLY_FLAT) & ~white
+    # Fog and snow are pale. Fog lifts the black; snow is bright and varies; brighter still is surely no fog.
+    pale = (cells.saturation < 0.15) & (cells.darkest > 70.0) & ~blown
+    rough = (cells.structure > 2.0) & (cells.brightest > 165.0)
+    white = pale & (rough | (cells.brightest > 230.0))
+    veiled = pale & (cells.structure < 4.0) & ~white
     kinds = {"dark": dim, "blown_out": blown, "veiled": veiled, "white": white}
     return {name: _without_lines(kind & field, lost) for name, kind in kinds.items()}
 
@@ -255,7 +224,7 @@ def _without_lines(kind: Mask, lost: Mask) -> Mask:
     """Return the connected places of cells that are mostly without lines; a place next to a line may be spoiled too."""
     count, place = cv2.connectedComponents(kind.astype(np.uint8), connectivity=4)
     all_of, lost_of = (np.bincount(place.ravel(), part.ravel(), count) for part in (kind, lost & kind))
-    return (MOSTLY * all_of < lost_of)[place] & kind
+    return (0.5 * all_of < lost_of)[place] & kind
 
 
 def _figures(
@@ -281,8 +250,9 @@ def _figures(
 
 
 def _expected_lines(pitch: Field, camera: Camera) -> VisibleLines:
-    lines = VisibleLines.from_camera(pitch.line_points(), camera).thinned(SPACING_PX)
-    wide = lines.width_px >= NARROWEST_PX
+    lines = VisibleLines.from_camera(pitch.line_points(), camera).thinned(8.0)
+    # Narrowest lines in the reduced picture that are used, unless there are hardly others.
+    wide = lines.width_px >= 0.5
     return lines[wide] if wide.sum() >= 3 * FEWEST_PLACES else lines
 
 
@@ -297,11 +267,14 @@ def _lost(sight: LinesInSight, ground: _Ground) -> Mask:
     np.add.at(expected, (at[:, 1], at[:, 0]), 1.0)
     np.add.at(found, (at[:, 1], at[:, 0]), sight.found.astype(float))
     believed = np.full((rows, columns), float(sight.found.mean()) if len(sight.found) else 0.0)
-    for reach in (FAR_CELLS, NEAR_CELLS):
+    # Standard deviations of the farther and the nearer surroundings, in cells.
+    for reach in (6.0, 2.0):
         here, there = (cv2.GaussianBlur(plane, (0, 0), reach) for plane in (expected, found))
-        prior = PRIOR_PLACES / reach**2
+        # One place on a line weighs as much as what is known from farther around.
+        prior = 1.0 / reach**2
         believed = (there + prior * believed) / (here + prior)
-    return np.asarray(believed < LOST)
+    # Lines are lost where less than this share of them is found.
+    return np.asarray(believed < 0.3)
 
 
 def _noise(frame: Frame, field: Mask) -> float:
@@ -438,7 +411,8 @@ class _Sharpness:
         if self.of_all is None:
             return False
         blur = self.of_all if self.of_clear is None else min(self.of_all, self.of_clear)
-        unusual = usual is not None and usual.blur_px is not None and blur > BLUR_OF_USUAL * usual.blur_px
+        # Unusual is a blur of three times the usual one, unless it is still small.
+        unusual = usual is not None and usual.blur_px is not None and blur > 3.0 * usual.blur_px
         return blur > (LEAST_UNUSUAL_BLUR_PX if unusual else MOST_BLUR_PX) * self.size
 
     @property
@@ -446,7 +420,7 @@ class _Sharpness:
         """True if the cells without lines are more blurred than the rest."""
         if self.of_clear is None or self.of_lost is None:
             return False
-        return self.of_lost > max(OTHER_BLUR * self.of_clear, LEAST_UNUSUAL_BLUR_PX * self.size)
+        return self.of_lost > max(1.5 * self.of_clear, LEAST_UNUSUAL_BLUR_PX * self.size)
 
 
 @dataclass(frozen=True)
@@ -469,9 +443,10 @@ class _Cells:
         blue, green, red = cv2.split(small)
         brightest, darkest = cv2.max(cv2.max(blue, green), red), cv2.min(cv2.min(blue, green), red)
         grey = cv2.cvtColor(small, cv2.COLOR_BGR2GRAY).astype(np.float32)
-        detail = cv2.GaussianBlur(grey, (0, 0), FINEST_PX) - cv2.blur(grey, (COARSEST_PX, COARSEST_PX))
+        # Structure is coarser than noise and finer than shading.
+        detail = cv2.GaussianBlur(grey, (0, 0), 1.5) - cv2.blur(grey, (31, 31))
         structure = np.sqrt(mean(detail * detail))
-        return cls(mean(brightest), mean(darkest), structure, mean(darkest >= BLOWN_OUT), mean(small))
+        return cls(mean(brightest), mean(darkest), structure, mean(darkest >= 245), mean(small))
 
     @property
     def saturation(self) -> Array:

@@ -31,27 +31,11 @@ Direction = Literal["outside", "inside", "right", "left", "far", "near"]
 OPPOSITE: dict[Direction, Direction] = {"outside": "inside", "right": "left", "far": "near"}
 FEWEST_MEASURED = 6
 """Fewest points of a marking, 25 cm apart, for an offset."""
-HARDLY, FARTHER_PX, MOST = 0.5, 30.0, 0.5
-"""Share found below which a marking is searched for farther away, the width of that search in pixels of a 4K frame,
-and the share that has to be seen there for it to be the marking."""
 MEASURED = ("index", "pixel", "normal", "px_per_metre", "px_per_metre_up", "length_px", "trust")
-LEAST_FREE = 0.1
-"""Least part of an offset that is left when the pose has given way to it: a line that the pose hangs on has none."""
-PUT_BACK_ERROR = 0.3
-"""Relative error of how far the pose gave way: lens and ground do so as well, by how much is known roughly."""
-LEAST_AGREEMENT = 0.6
-"""Least agreement of a pose for offsets: below it, what lies beside its lines is not their paint."""
 SURE, LEAST_OFF_M = 3.0, 0.03
 """Limits from which a marking is elsewhere: in its sigmas, and in metres."""
-STRAIGHT = 0.97
-"""Length of the mean of the unit normals of a marking from which it is straight."""
-EDGE_M = 0.3
-"""Distance from the outermost line of its direction up to which a line bounds the field."""
 USUAL_COUNTS = 1.0
 """Weight, in patches of line, of how patches usually differ beside those of the marking itself."""
-
-HALF_ARE_NEARER = 0.6745
-"""Median absolute value of normal errors, in sigmas."""
 
 
 @dataclass(frozen=True)
@@ -97,7 +81,8 @@ def report_markings(
     whole = {name: number for number, name in enumerate(dict.fromkeys(names))}
     group = np.array([whole[name] for name in names])
     offsets = {}
-    if found.evidence.agreement >= LEAST_AGREEMENT:
+    # Least agreement of a pose for offsets: below it, what lies beside its lines is not their paint.
+    if found.evidence.agreement >= 0.6:
         offsets = _offsets(lines, group, found, _farther_away(lines, group, found, channels, response))
     pieces = group[found.evidence.marking]
     reports = []
@@ -128,15 +113,16 @@ def _farther_away(
     if measured is None:
         return None
     pieces = group[evidence.marking]
-    lost = [n for n in np.unique(pieces) if evidence.found[pieces == n].mean() < HARDLY]
+    # A marking of which less is found is looked for farther away.
+    lost = [n for n in np.unique(pieces) if evidence.found[pieces == n].mean() < 0.5]
     its = np.flatnonzero(np.isin(group[lines.marking], lost))
     if len(its) == 0:
         return measured
-    farther = measure_lines(lines[its], camera, channels, response, FARTHER_PX * camera.intrinsics.relative_size)
+    farther = measure_lines(lines[its], camera, channels, response, 30.0 * camera.intrinsics.relative_size)
     farther = replace(farther, index=its[farther.index], misfit_px=measured.misfit_px)
     of_group = group[farther.points.marking]
     # Something that is seen here and there beside a marking is not it.
-    whole = [n for n in lost if np.sum(of_group == n) >= MOST * np.sum(pieces == n)]
+    whole = [n for n in lost if np.sum(of_group == n) >= 0.5 * np.sum(pieces == n)]
     elsewhere = ~np.isin(group[measured.points.marking], whole)
     return _together(lines, measured[elsewhere], farther[np.isin(of_group, whole)])
 
@@ -168,7 +154,8 @@ def _offsets(
         if not sure or len(free) >= len(offsets) / 3:
             break
         free.append(max(sure, key=lambda n: sure[n]))
-    worse = max(1.0, float(np.median(list(off.values()))) / HALF_ARE_NEARER) if off else 1.0
+    # The median absolute value of normal errors is 0.6745 sigma.
+    worse = max(1.0, float(np.median(list(off.values()))) / 0.6745) if off else 1.0
     return {number: (offset, worse * sigma) for number, (offset, sigma) in offsets.items()}
 
 
@@ -178,12 +165,15 @@ def _joint_offsets(means: _Means, free: Sequence[int]) -> dict[int, tuple[float,
     for row, number in enumerate(means.group):
         rows = [row, *(means.group.index(other) for other in free if other != number)]
         remaining = np.eye(len(rows)) - means.carried[np.ix_(rows, rows)]
-        if np.linalg.svd(remaining, compute_uv=False)[-1] < LEAST_FREE:
+        # Least part of an offset that is left when the pose has given way to it: a line that the pose hangs on has
+        # none.
+        if np.linalg.svd(remaining, compute_uv=False)[-1] < 0.1:
             continue
         back = np.linalg.inv(remaining)[0]
         offset = float(back @ means.mean[rows])
         of_means = float(np.sqrt(back**2 @ means.variance[rows]))
-        offsets[number] = offset, float(np.hypot(of_means, PUT_BACK_ERROR * (offset - means.mean[row])))
+        # Lens and ground give way as well, by how much is known roughly.
+        offsets[number] = offset, float(np.hypot(of_means, 0.3 * (offset - means.mean[row])))
     return offsets
 
 
@@ -194,11 +184,13 @@ def direction_of(lines: LinePoints, its: NDArray[np.intp]) -> tuple[Direction, f
     """
     normal, place = lines.normal[its, :2], lines.position[its, :2]
     mean = normal.mean(axis=0)
-    if np.linalg.norm(mean) < STRAIGHT:
+    # A straight marking has normals of one direction.
+    if np.linalg.norm(mean) < 0.97:
         return "outside", float(np.sign(np.sum(normal * (place - place.mean(axis=0))))) or 1.0
     axis = int(np.argmax(np.abs(mean)))
     sign, at = float(np.sign(mean[axis])), float(place[:, axis].mean())
-    if abs(at) > np.abs(lines.position[:, axis]).max() - EDGE_M:
+    # Distance from the outermost line of its direction up to which a line bounds the field.
+    if abs(at) > np.abs(lines.position[:, axis]).max() - 0.3:
         return "outside", sign * float(np.sign(at))
     return ("right" if axis == 0 else "far"), sign
 

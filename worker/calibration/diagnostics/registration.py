@@ -30,15 +30,11 @@ Segmented = tuple[Camera, Response]
 
 PIXEL_M = 0.1
 
-COARSE_STEP_M, COARSE_HALF_M, COARSE_BLUR_M = 0.2, 18.0, 0.4
+COARSE_STEP_M, COARSE_HALF_M = 0.2, 18.0
 # Largest displacement of two views that is found.
 REACH_M = 8.0
-# Shifts that leave less than this part of the common region are not judged.
-LEAST_COMMON = 0.3
-# Among shifts that explain the views alike (along a lone halfway line) the smallest is taken.
-SHIFT_PENALTY = 0.05
-# Views that are nearer than this where they should be, and so alike there, need no other guess.
-NEAR_M, ALIKE = 0.5, 0.7
+# Displacement below which two views are near each other.
+NEAR_M = 0.5
 
 # Sampled finely, so that no edge of a line falls between two samples; once blurred, fewer will do.
 FINE_STEP_M, FINE_HALF_M = 0.05, 12.0
@@ -50,24 +46,11 @@ EXPECTED = np.array([0.02, 0.02, 0.02, 0.16, 0.16, 0.16])
 # at the centre are not suspected of turns and moves that happen to cancel there.
 FINE_STAGES = ((0.8, 8, (1.0,)), (0.4, 4, (0.3,)), (0.2, 2, (0.1, 0.01)))
 FINEST_STRIDE = min(stride for _, stride, _ in FINE_STAGES)
-# Rounds end when one moves the views by less than this part of the blur, and after so many at the latest.
-SETTLED, MOST_ROUNDS = 0.002, 5
-# A difference of this part of a line's response counts as half an outlier.
-OUTLIER = 0.5
-# Grass, where neither view shows more than this, is left out.
-LEAST_RESPONSE = 0.05
-# Responses differ by this much through sampling alone.
-SAMPLING_NOISE = 0.005
 # A direction in which the markings leave the displacement looser than this is one along which they can slide.
 LOOSE_M = 0.1
 
-# Below these the views show nothing in common.
+# With less line on top of each other the views show nothing in common.
 LEAST_SUPPORT_M = 4.0
-LEAST_CORRELATION = 0.3
-# Length of line across a direction that holds the views in it.
-HOLDING_M = 8.0
-# Expected error of the place of a metre of line.
-EXPECTED_NOISE_M = 0.05
 
 
 @dataclass(frozen=True)
@@ -123,7 +106,7 @@ def register_pair(
     segmented = ((first, first_response), (second, second_response))
     expected_directions = directions_in_common(pitch, first, second, centre)
     best = _best_fit(pitch, segmented, centre, expected_directions)
-    if best is None or best.support < LEAST_SUPPORT_M or best.correlation < LEAST_CORRELATION:
+    if best is None or best.support < LEAST_SUPPORT_M or best.correlation < 0.3:
         return None
     # A halfway line fits itself wherever it is slid to. Where a circle should have held it, that is no registration.
     if best.held < expected_directions:
@@ -184,9 +167,11 @@ def directions_in_common(pitch: Field, first: Camera, second: Camera, centre: Ar
     near = np.abs(lines.position[:, :2] - centre).max(axis=1) < FINE_HALF_M
     common = lines[seen & near]
     across = common.normal[:, :2]
-    enough = np.linalg.eigvalsh(lines.spacing * across.T @ across) > HOLDING_M
+    # Length of line across a direction that holds the views in it.
+    enough = np.linalg.eigvalsh(lines.spacing * across.T @ across) > 8.0
     jacobian = (across[:, :, None] * forms_of_both(first, second, common.position)).sum(axis=1)
-    information = lines.spacing / EXPECTED_NOISE_M**2 * jacobian.T @ jacobian
+    # A metre of line is measured to 5 cm.
+    information = lines.spacing / 0.05**2 * jacobian.T @ jacobian
     at_centre = forms_of_both(first, second, pitch.lift(centre))
     covariance = at_centre @ np.linalg.inv(information + np.eye(len(information))) @ at_centre.T
     held = np.linalg.eigvalsh(covariance) < LOOSE_M**2
@@ -215,8 +200,9 @@ class _Fit:
 def _best_fit(pitch: Field, segmented: Sequence[Segmented], centre: Array, expected_directions: int) -> _Fit | None:
     """Return the fit where the views should be alike, or, unless they are there, where they look most alike."""
     expected = _fit(pitch, segmented, centre, np.zeros(2), expected_directions)
+    # Views that are near where they should be, and so alike there, need no other guess.
     if (
-        expected.correlation > ALIKE
+        expected.correlation > 0.7
         and expected.held == expected_directions
         and np.hypot(*expected.displacement) < NEAR_M
     ):
@@ -285,7 +271,7 @@ def _coarse_shift(first: BirdsEye, second: BirdsEye, line_width: float) -> Array
     """Return the shift (2,) in metres, world axes, of the second view relative to the first with the highest
     correlation."""
     a_seen, b_seen = first[1], second[1]
-    a, b = (_smooth(view, COARSE_BLUR_M, COARSE_STEP_M, line_width) * view[1] for view in (first, second))
+    a, b = (_smooth(view, 0.4, COARSE_STEP_M, line_width) * view[1] for view in (first, second))
     reach = round(REACH_M / COARSE_STEP_M)
     # Over what both see at each shift (masked normalised correlation after Padfield, 2012).
     plane = cv2.getOptimalDFTSize(2 * a.shape[0])
@@ -300,12 +286,14 @@ def _coarse_shift(first: BirdsEye, second: BirdsEye, line_width: float) -> Array
     var_a = correlate(fa2, fbs) - sum_a**2 / common
     var_b = correlate(fas, fb2) - sum_b**2 / common
     covariance = correlate(fa, fb) - sum_a * sum_b / common
-    judged = (common > LEAST_COMMON * common.max()) & (np.minimum(var_a, var_b) > 1e-3)
+    # Shifts that leave less than this part of the common region are not judged.
+    judged = (common > 0.3 * common.max()) & (np.minimum(var_a, var_b) > 1e-3)
     if not judged.any():
         return None
     correlation = covariance[judged] / np.sqrt(var_a[judged] * var_b[judged])
     shifts = ground_grid(reach, reach, COARSE_STEP_M)[judged]
-    best = np.argmax(correlation - SHIFT_PENALTY * np.linalg.norm(shifts, axis=1) / REACH_M)
+    # Among shifts that explain the views alike (along a lone halfway line) the smallest is taken.
+    best = np.argmax(correlation - 0.05 * np.linalg.norm(shifts, axis=1) / REACH_M)
     return np.asarray(shifts[best])
 
 
@@ -361,14 +349,15 @@ def _fine_moves(
         every = stride // FINEST_STRIDE
         coarser = np.ascontiguousarray(forms[::every, ::every])
         for least in leasts:
-            for _ in range(MOST_ROUNDS):
+            for _ in range(5):
                 warped, valid = _moved(smooth, seen, coarser, moves - start, stride)
                 right_side, information = _normal_equations(warped[0], warped[1], valid, coarser, step_m, blur)
                 found = at_middle @ moves
                 prior = 1 / max(float(found @ expected @ found), least**2)
                 step = np.linalg.solve(information + prior * np.eye(len(moves)), right_side - prior * moves)
                 moves = moves + step
-                if np.hypot(*(at_middle @ step)) < SETTLED * blur:
+                # Rounds end when one moves the views by less than this part of the blur.
+                if np.hypot(*(at_middle @ step)) < 0.002 * blur:
                     break
     covariance = np.asarray(np.linalg.inv(information + np.eye(len(moves))), float)
     common = np.minimum(*warped)[valid].sum(dtype=float) * step_m**2
@@ -393,18 +382,21 @@ def _normal_equations(
     a: Response, b: Response, valid: Mask, forms: Array, step_m: float, blur: float
 ) -> tuple[Array, Array]:
     """Return gradient (12,) and information (12, 12) of the moves by the difference of two views."""
-    active = valid & (a + b > LEAST_RESPONSE)
+    # Grass, where neither view shows more than this, is left out.
+    active = valid & (a + b > 0.05)
     down, right = np.gradient(a + b)
     gradient = np.stack([right[active], -down[active]], axis=-1).astype(float) / (2 * step_m)
     jacobian = np.einsum("md,mdj->mj", gradient, forms[active])
     jacobian[:, :6] *= -1
     residual = (a - b)[active].astype(float)
-    # Features of one view only, such as players, must not pull (Geman and McClure's weight); lines still apart must.
-    scale = OUTLIER * float(np.quantile(np.maximum(a, b)[active], 0.9)) if len(residual) else 1.0
+    # Features of one view only, such as players, must not pull (Geman and McClure's weight); lines still apart must. A
+    # difference of half a line's response counts as half an outlier.
+    scale = 0.5 * float(np.quantile(np.maximum(a, b)[active], 0.9)) if len(residual) else 1.0
     weight = 1 / (1 + (residual / scale) ** 2) ** 2
     # The blur makes neighbours alike: this many pixels count as one.
     alike = 4 * np.pi * (blur / step_m) ** 2
-    noise = SAMPLING_NOISE**2 + (weight * residual**2).sum() / max(weight.sum(), 1.0)
+    # Responses differ by this much through sampling alone.
+    noise = 0.005**2 + (weight * residual**2).sum() / max(weight.sum(), 1.0)
     weighted = jacobian * (weight / (noise * alike))[:, None]
     # einsum rather than matrix products, so that the number of threads cannot change a digit.
     return np.einsum("mi,m->i", weighted, residual), np.einsum("mi,mj->ij", weighted, jacobian)

@@ -16,15 +16,7 @@ from worker.calibration.geometry.camera import Array, Camera
 from worker.calibration.geometry.field import Field, LinePoints
 from worker.calibration.refinement.uncertainty import RefinedPose
 
-PIECE_POINTS = (20, 40, 80, 160)
-"""Line points (25 cm apart) that make a place of the curve: the fewest with which it has not too many."""
 MOST_PLACES = 24
-FEWEST_POINTS = 4
-LARGEST_SIGMA_M = 0.2
-"""Largest sigma of a line that is compared."""
-
-WELL_KNOWN = 2.0
-"""Multiple of the usual sigma up to which a place may be the worst."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +42,7 @@ class Seam:
     def worst(self) -> SeamPlace | None:
         """Place of the largest error, without places that are measured clearly less well than most."""
         usual = float(np.median([place.sigma_m for place in self.places])) if self.places else 0.0
-        known = [place for place in self.places if place.sigma_m <= WELL_KNOWN * usual]
+        known = [place for place in self.places if place.sigma_m <= 2.0 * usual]
         return max(known, key=lambda place: place.error_m, default=None)
 
 
@@ -63,16 +55,18 @@ def measure_seam(pitch: Field, first: RefinedPose, second: RefinedPose) -> Seam:
     put_first, sigma_first = paint_offsets(lines, first.camera, first.measured[a])
     put_second, sigma_second = paint_offsets(lines, second.camera, second.measured[b])
     apart, sigma = put_second - put_first, np.hypot(sigma_first, sigma_second)
-    known = np.isfinite(apart) & (sigma < LARGEST_SIGMA_M)
+    # Largest sigma of a line that is compared.
+    known = np.isfinite(apart) & (sigma < 0.2)
     index, apart, sigma = index[known], apart[known], sigma[known]
-    for points in PIECE_POINTS:
+    # Line points (25 cm apart) that make a place of the curve: the fewest with which it has not too many.
+    for points in (20, 40, 80, 160):
         piece = np.stack([lines.marking[index], index // points], axis=1)
         pieces, which, count = np.unique(piece, axis=0, return_inverse=True, return_counts=True)
         if len(pieces) <= MOST_PLACES:
             break
     which = which.ravel()
     places = []
-    for number in np.flatnonzero(count >= FEWEST_POINTS):
+    for number in np.flatnonzero(count >= 4):
         its = which == number
         normal = lines.normal[index[its], :2].mean(axis=0)
         error = float(np.median(apart[its]))

@@ -24,15 +24,8 @@ from worker.calibration.refinement.uncertainty import ParameterUncertainty, Refi
 from worker.calibration.solve import Problem, judge_each
 from worker.calibration.wide_path import search_and_refine
 
-FIRST_SEARCH_PX = (40.0, 24.0)
-"""Half width of the first rounds' search: a field whose measures are guesses has its lines farther from where they
-are expected."""
 TOLD = 0.25
 """Largest part of the prior sigma that the lines leave of a known measure."""
-UNTOUCHED = 0.9
-"""Part of the prior sigma from which no line that the measure moves was measured."""
-SURE_DIP = 2.0
-"""Sigmas up to which a ridge lower than the corners is a flat field."""
 QUANTITIES = {
     "length_m": "the pitch's length",
     "width_m": "the pitch's width",
@@ -114,7 +107,8 @@ def fit_measures(
 ) -> tuple[RefinedPoses, list[Measure]]:
     """Refine on the field with those measures that the lines tell; return the poses and every measure."""
     free = free_field(pitch)
-    everything = refine(pitch, cameras, observations, stitch_weight, free, (*FIRST_SEARCH_PX, *SEARCH_PX))
+    # A field whose measures are guesses has its lines farther from where they are expected.
+    everything = refine(pitch, cameras, observations, stitch_weight, free, (40.0, 24.0, *SEARCH_PX))
     tried = try_ridges(everything, free, observations)
     measures = [
         _measure(pitch, everything.pitch, parameter, found, tried, cameras)
@@ -154,7 +148,7 @@ def _measure(
     detail = ""
     if not given.template.size and parameter.name in ("length_m", "width_m"):
         detail = "markings of your own lie where their coordinates say, whatever the measure"
-    elif remaining > UNTOUCHED:
+    elif remaining > 0.9:
         detail = "no line that depends on it is in view"
     elif not known:
         detail = f"the lines in view leave {remaining:.0%} of what was open"
@@ -185,7 +179,7 @@ def _with_known(
     pitch, still_free = given, []
     for parameter, measure in zip(free, measures, strict=True):
         # A ridge below the corners by no more than chance is a flat field.
-        flat = parameter.name == "ridge_height_m" and -SURE_DIP * measure.sigma < measure.value <= 0
+        flat = parameter.name == "ridge_height_m" and -2.0 * measure.sigma < measure.value <= 0
         if flat:
             pitch = pitch.flat()
         elif measure.known:

@@ -23,10 +23,6 @@ from worker.calibration.refinement.unknowns import Unknowns
 from worker.calibration.robust import TUKEY, robust_scale, tukey_loss, tukey_weights
 
 SPACING_M = 10.0
-STEPS = 4
-"""Gauss-Newton steps per length, for everything that is found with it."""
-ALIKE = 4.0
-"""Cost above the least up to which lengths fit alike: two standard deviations."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +66,8 @@ class TriedRidges:
     @property
     def alike(self) -> tuple[float, float]:
         """Shortest and longest ridge that fit about as well as the best."""
-        lengths = self.lengths[self._costs < self._costs.min() + ALIKE]
+        # Two standard deviations.
+        lengths = self.lengths[self._costs < self._costs.min() + 4.0]
         return float(lengths.min()), float(lengths.max())
 
     def spread(self, read: Callable[[Field], float]) -> float:
@@ -109,7 +106,7 @@ def _fitted(
 ) -> tuple[Estimate, WeightedRows]:
     """Return the estimate of everything else for a field, and the weighted residuals of the lines there."""
     here = Estimate.initial(pitch, cameras, unknowns)
-    for _ in range(STEPS):
+    for _ in range(4):
         unknowns = unknowns.around(here.pitch, here.lines)
         here = gauss_newton_step(here, cameras, measured, unknowns, tukey_weights).to
     return here, weigh_rows(here.rows(measured, unknowns), here.heights, unknowns, tukey_weights)

@@ -23,9 +23,6 @@ from worker.calibration.gate.quality import Gate, Reason, Refusal
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.field import Field
 
-MOST = 0.6
-"""Share of the common line from which two cameras both see it."""
-
 
 @dataclass(frozen=True)
 class CameraResponse:
@@ -186,7 +183,7 @@ def compare_pairs_before(
 def _both_see(first: Evidence, second: Evidence) -> bool:
     """True if both find most of the line that both should see, each where its pose puts it."""
     _, a, b = np.intersect1d(first.index, second.index, return_indices=True)
-    return len(a) > 0 and float(np.mean(first.found[a] & second.found[b])) >= MOST
+    return len(a) > 0 and float(np.mean(first.found[a] & second.found[b])) >= 0.6
 
 
 def find_contradictions(pairs: Sequence[Pair], gate: Gate) -> list[Contradiction]:

@@ -12,10 +12,6 @@ from worker.calibration.geometry.camera import Array, Camera
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.visibility import VisibleLines
 
-LEAST_SHARE = 0.1
-"""Least visible length of a marking, as a share of that of the most visible marking: arcs in the far corners are
-farther away than the far touchline, but only a metre long."""
-
 
 def far_marking_shift_m(pitch: Field, camera: Camera, other: Camera) -> float | None:
     """Return the distance (m, on the ground) between the pixels of the farthest marking in view by two cameras.
@@ -36,7 +32,8 @@ def farthest_marking(pitch: Field, camera: Camera) -> Array:
     seen = VisibleLines.from_camera(pitch.line_points(), camera).points
     away = np.linalg.norm(seen.position - camera.pose.position, axis=1)
     which, count = np.unique(seen.marking, return_counts=True)
-    long_enough = which[count >= LEAST_SHARE * count.max(initial=0)]
+    # Arcs in the far corners are farther away than the far touchline, but only a metre long.
+    long_enough = which[count >= 0.1 * count.max(initial=0)]
     farthest = max(long_enough, key=lambda number: float(away[seen.marking == number].mean()), default=None)
     return seen.position[seen.marking == farthest]
 

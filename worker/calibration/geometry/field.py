@@ -19,10 +19,6 @@ from worker.calibration.geometry.camera import Array
 
 FOOTBALL = load("football")
 
-ARC_STEP_M = 0.05
-LEAST_HIP_M = 0.5
-"""Least distance of the ridge's ends from the goal lines: a roof has no upright sides."""
-
 
 @dataclass(frozen=True)
 class Marking:
@@ -142,7 +138,8 @@ class Field:
         assert raised.ridge is not None
         (start, end) = raised.ridge[np.argsort(raised.ridge[:, 0])]
         middle = (start[0] + end[0]) / 2
-        half = min(max(length / 2, 0.0), self.length / 2 - abs(middle) - LEAST_HIP_M)
+        # Least distance of the ridge's ends from the goal lines: a roof has no upright sides.
+        half = min(max(length / 2, 0.0), self.length / 2 - abs(middle) - 0.5)
         return replace(raised, ridge=np.array([[middle - half, *start[1:]], [middle + half, *end[1:]]]))
 
     def height(self, xy: Array) -> Array:
@@ -270,7 +267,7 @@ def _marking(shape: Shape) -> Marking:
         case Line():
             return Marking(shape.name, np.array(shape.points), shape.width, shape.colour)
         case Arc():
-            count = max(8, int(np.ceil((shape.end - shape.start) * shape.radius / ARC_STEP_M)))
+            count = max(8, int(np.ceil((shape.end - shape.start) * shape.radius / 0.05)))
             angle = np.linspace(shape.start, shape.end, count + 1)
             around = shape.radius * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
             return Marking(shape.name, shape.centre + around, shape.width, shape.colour)

@@ -17,12 +17,6 @@ from worker.calibration.geometry.camera import Array
 from worker.calibration.geometry.field import LinePoints
 
 NODE_M = 7.0
-CORRELATION_M = 10.0
-MOST_UNEVEN = 4 / 3
-"""Largest unevenness of the ground, in multiples of the usual one: a ground that may do anything explains any pose."""
-NUGGET = 1e-6
-EVEN_SHARE, EVEN_NODES = 4 / 15, 2.0
-ORDINARY_NODES = 8.0
 
 
 @dataclass(frozen=True)
@@ -56,8 +50,9 @@ class Ground:
         corners = np.stack([low, low + [1, 0], low + [0, 1], low + [1, 1]], axis=1)
         share = np.stack([(1 - right) * (1 - up), right * (1 - up), (1 - right) * up, right * up], axis=1)
         nodes, node = np.unique(corners.reshape(-1, 2), axis=0, return_inverse=True)
-        apart = np.sqrt(3) * NODE_M * np.linalg.norm(nodes[:, None] - nodes[None], axis=-1) / CORRELATION_M
-        covariance = (1 + apart) * np.exp(-apart) + NUGGET * np.eye(len(nodes))
+        # Heights correlate over 10 m.
+        apart = np.sqrt(3) * NODE_M * np.linalg.norm(nodes[:, None] - nodes[None], axis=-1) / 10.0
+        covariance = (1 + apart) * np.exp(-apart) + 1e-6 * np.eye(len(nodes))
         return cls(node.reshape(-1, 4), share, np.linalg.inv(covariance), lines.uneven_m)
 
     def __len__(self) -> int:
@@ -66,17 +61,18 @@ class Ground:
     @property
     def most_m(self) -> float:
         """Largest unevenness (m) that this ground is taken to have."""
-        return self.usual_m * MOST_UNEVEN
+        # A ground that may do anything explains any pose.
+        return self.usual_m * (4 / 3)
 
     @property
     def even(self) -> Belief:
         """Prior for finding poses: a flat ground is preferred to swells where both explain the lines."""
-        return Belief(self.usual_m * EVEN_SHARE, EVEN_NODES)
+        return Belief(uneven_m=self.usual_m * (4 / 15), nodes=2.0)
 
     @property
     def ordinary(self) -> Belief:
         """Prior for uncertainties: a few lines that fit a flat ground do not show that it has not sunk as a whole."""
-        return Belief(self.usual_m, ORDINARY_NODES)
+        return Belief(uneven_m=self.usual_m, nodes=8.0)
 
     def under_points(self, heights: Array, point: NDArray[np.intp]) -> Array:
         """Return the heights (M,) under line points (M,), interpolated from those of the nodes (K,)."""

@@ -20,20 +20,13 @@ of the principal point a pixel of a 4K frame."""
 HEAT_FOCAL = 3e-4
 """Sigma of a focal length by day and night since the photos of the board, part of it: metal grows by 23 millionths a
 kelvin, and summer noon and a winter's night are 13 K to either side of the mean."""
-FREE_FOCAL_LENGTH, FREE_RIDGE_M = 0.005, 0.3
-"""Prior sigma of what is left free, a part of the focal length and m: a focus ring that was touched, a crown of up to
-half a metre."""
-FREE_FOCAL, FREE_CENTRE, FREE_BEND = 0.1, 20 / 3840, 0.05
-"""Prior sigma of a lens that is found with a pose: part of the focal length, part of the frame's width, and k1 and k2
-at half the width of the frame."""
+FREE_RIDGE_M = 0.3
+"""Prior sigma of a free ridge: a crown of up to half a metre."""
+FREE_BEND = 0.05
+"""Prior sigma of k1 and k2, at half the width of the frame, of a lens that is found with a pose."""
 TAPE = 3e-4
 """Prior sigma of length, width and diagonal, part of each: a tape that is pulled with care. It comes from the 3 cm that
 were taken for a football pitch of 105 m; no bench has chosen it."""
-LEVELLED_M = 0.02
-"""Prior sigma of the height of a ridge: a level over half a pitch. No bench has chosen it."""
-FREE_LENGTH_M, FREE_WIDTH_M = 5.0, 5.0
-"""Prior sigma of a field of unknown size: pitches for matches are 90 to 120 m long and 45 to 90 m wide, and mostly near
-105 m and 68 m."""
 
 
 @dataclass(frozen=True)
@@ -177,9 +170,11 @@ def _focal_sigma(lens: Lens, sigma: Mapping[str, float]) -> float:
 def free_lens_sigma(lens: Lens) -> dict[str, float]:
     """Return the sigma, by the names of `Lens.sigma`, of a lens that only lines determine."""
     half_width = lens.size[0] / (2 * lens.focal_length_px)
-    centre = FREE_CENTRE * lens.size[0]
+    # Twenty pixels of a 4K frame.
+    centre = 20 / 3840 * lens.size[0]
+    # Relative sigma of the focal length.
     return {
-        "fx": FREE_FOCAL * lens.focal_length_px,
+        "fx": 0.1 * lens.focal_length_px,
         "cx": centre,
         "cy": centre,
         "k1": FREE_BEND * half_width**-2,
@@ -189,8 +184,9 @@ def free_lens_sigma(lens: Lens) -> dict[str, float]:
 
 def careful_measurement(pitch: Field) -> dict[str, float]:
     """Return the sigma (m) of a field measured with care, by parameter; diagonals give the right angles."""
+    # A level over half a field; no bench has chosen it.
     return {
-        "ridge_height_m": LEVELLED_M,
+        "ridge_height_m": 0.02,
         "length_m": TAPE * pitch.length,
         "width_m": TAPE * pitch.width,
         "skew_m": TAPE * hypot(pitch.length, pitch.width),
@@ -225,8 +221,9 @@ def with_focal_length(camera: Camera, longer_px: float) -> Camera:
 def free_focal_lengths(cameras: Sequence[Camera]) -> list[LensParameter]:
     """Return the focal length of each camera, to be found along with its pose."""
     lengths = [p for p in lens_parameters(cameras) if p.name == "focal_length_px"]
+    # A focus ring that was touched.
     return [
-        replace(p, expected=FREE_FOCAL_LENGTH * camera.intrinsics.focal_length_px)
+        replace(p, expected=0.005 * camera.intrinsics.focal_length_px)
         for p, camera in zip(lengths, cameras, strict=True)
     ]
 
@@ -238,7 +235,8 @@ def free_ridge(pitch: Field) -> list[FieldMeasure]:
 
 def free_field(pitch: Field) -> list[FieldMeasure]:
     """Return length, width and ridge height of a field of which next to nothing is known."""
-    return [_length(pitch, FREE_LENGTH_M), _width(pitch, FREE_WIDTH_M), _ridge_height(pitch, FREE_RIDGE_M)]
+    # Fields for matches are 90 to 120 m long and 45 to 90 m wide, and mostly near 105 m and 68 m.
+    return [_length(pitch, 5.0), _width(pitch, 5.0), _ridge_height(pitch, FREE_RIDGE_M)]
 
 
 def _ridge_height(pitch: Field, expected: float) -> FieldMeasure:

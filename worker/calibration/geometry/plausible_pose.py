@@ -8,9 +8,6 @@ from worker.calibration.geometry.camera import Pose
 
 HIGHEST_M, FARTHEST_M = 200.0, 500.0
 """Limits above the field, and from its centre."""
-STEEPEST_ROLL_DEG = 60.0
-STRAIGHT_DOWN = 0.95
-"""Component of the view along the vertical from which a picture has no upright."""
 
 
 def films_a_field(pose: Pose) -> bool:
@@ -19,6 +16,7 @@ def films_a_field(pose: Pose) -> bool:
     if not (0 < z <= HIGHEST_M and math.hypot(x, y) <= FARTHEST_M):
         return False
     right, down, forward = pose.matrix[:, 2]
-    if abs(forward) > STRAIGHT_DOWN:
+    # Component of the view along the vertical from which a picture has no upright.
+    if abs(forward) > 0.95:
         return bool(forward < 0)
-    return bool(-down >= math.cos(math.radians(STEEPEST_ROLL_DEG)) * math.hypot(right, down))
+    return bool(-down >= math.cos(math.radians(60.0)) * math.hypot(right, down))

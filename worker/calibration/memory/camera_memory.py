@@ -21,15 +21,9 @@ from worker.calibration.geometry.field import LinePoints
 from worker.calibration.memory.epoch import Epoch, camera_from_json, camera_to_json
 
 FORMAT = 1
-WIND_RAD, WIND_M = 0.003, 0.03
-"""Standard deviation, per axis, of a camera's pose around that of its mount by wind and heat, at the moment of a
-frame."""
-WIND = np.array([WIND_RAD] * 3 + [WIND_M] * 3)
+WIND = np.array([0.003] * 3 + [0.03] * 3)
 ANCHOR_JOBS = 8
 """Number of jobs that make up the anchor."""
-MOST_EARLIER, FEWEST_JOBS = 2, 4
-"""Number of earlier epochs that are kept, and fewest jobs of each: another way of looking tells lens and ground
-apart."""
 
 
 @dataclass(frozen=True)
@@ -98,8 +92,10 @@ class CameraMemory:
             return replace(kept, recent=Epoch.from_job(*arguments))
         if kept.recent.looks_like(job.found, job.lines):
             return replace(kept, recent=kept.recent.joined(*arguments))
-        before = [*kept.earlier, kept.recent] if kept.recent.jobs >= FEWEST_JOBS else list(kept.earlier)
-        return replace(kept, recent=Epoch.from_job(*arguments), earlier=tuple(before[-MOST_EARLIER:]))
+        # A few jobs are no epoch.
+        before = [*kept.earlier, kept.recent] if kept.recent.jobs >= 4 else list(kept.earlier)
+        # Another way of looking tells lens and ground apart.
+        return replace(kept, recent=Epoch.from_job(*arguments), earlier=tuple(before[-2:]))
 
     def takes_for_anchor(self, job: AcceptedJob) -> bool:
         """True if a job is one of the first nights, with camera and lens as in the very first."""

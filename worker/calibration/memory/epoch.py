@@ -25,10 +25,6 @@ from worker.calibration.robust import tukey_weights
 
 MOST_JOBS = 100
 """Most jobs as whose mean an older mean counts."""
-LEAST_TRUST = 0.5
-SAME_PLACE_PX = 1.0
-"""Largest distance of a point from its mean, in pixels of a 4K frame: a farther one is not the same paint, somebody
-stands on it."""
 SAME_VIEW_PX = 60.0
 """Mean move of a camera's picture of the field, in pixels of a 4K frame, up to which it looks the same way."""
 PX_STEP = 1e-3
@@ -64,7 +60,9 @@ class Epoch:
         count = np.zeros(len(lines))
         offset = np.zeros(len(lines))
         count[self.index], offset[self.index] = self.count, self.offset
-        near = np.abs(value - offset[new]) <= SAME_PLACE_PX * camera.intrinsics.relative_size
+        # Largest distance of a point from its mean, in pixels of a 4K frame: a farther one is not the same paint,
+        # somebody stands on it.
+        near = np.abs(value - offset[new]) <= camera.intrinsics.relative_size
         taken = near | (count[new] == 0)
         new, value = new[taken], value[taken]
         count[new] = np.minimum(count[new], MOST_JOBS - 1) + 1
@@ -128,7 +126,7 @@ def _trusted(camera: Camera, measured: Measurements, lines: LinePoints) -> tuple
     them."""
     offset = measured.offset(camera, lines.position[measured.index])
     with np.errstate(invalid="ignore"):
-        good = np.isfinite(offset) & (measured.trust >= LEAST_TRUST)
+        good = np.isfinite(offset) & (measured.trust >= 0.5)
     good[good] = tukey_weights(offset[good] / measured.sigma_px[good]) > 0
     order = np.argsort(measured.index[good])
     return measured.index[good][order], offset[good][order]

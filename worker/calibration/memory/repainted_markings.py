@@ -23,15 +23,7 @@ from worker.calibration.memory.camera_memory import WIND, CameraMemory
 from worker.calibration.memory.epoch import SAME_VIEW_PX, Epoch
 from worker.calibration.robust import HUBER, robust_scale
 
-LEAST_M, LEAST_PX = 0.025, 0.5
-"""Least move of a repainted marking, in metres and in pixels of a 4K frame."""
-FEWEST_POINTS, MOST_MARKINGS = 8, 0.34
-"""Fewest points of a repainted marking measured in both nights, and largest part of all markings that may have
-moved: else it is not the paint."""
-LEAST_GAIN = 30.0
-"""Half the sum of squares, in units of the expected errors, that a change has to explain to be accepted."""
-ROUNDS = 4
-HELD, TINY = 1e-9, 1e-12
+TINY = 1e-12
 
 
 def find_repainted_markings(memory: CameraMemory, measured: Measurements, lines: LinePoints) -> NDArray[np.intp]:
@@ -45,15 +37,17 @@ def find_repainted_markings(memory: CameraMemory, measured: Measurements, lines:
     if differ.usual_px > SAME_VIEW_PX * camera.intrinsics.relative_size:
         return known
     markings, counts = np.unique(differ.marking, return_counts=True)
-    candidates = markings[counts >= FEWEST_POINTS]
-    limit_px = LEAST_PX * camera.intrinsics.relative_size
+    candidates = markings[counts >= 8]
+    # A repainted marking has moved by more than 2.5 cm and half a pixel of a 4K frame.
+    limit_px = 0.5 * camera.intrinsics.relative_size
     repainted = [
         number
         for number, metres in differ.explained_by(candidates).items()
-        if abs(metres) > LEAST_M and abs(metres) * np.median(differ.across[differ.marking == number]) > limit_px
+        if abs(metres) > 0.025 and abs(metres) * np.median(differ.across[differ.marking == number]) > limit_px
     ]
     together = np.union1d(known, repainted).astype(np.intp)
-    believable = len(together) <= MOST_MARKINGS * len(np.union1d(known, candidates))
+    # If more markings have moved it is not the paint.
+    believable = len(together) <= 0.34 * len(np.union1d(known, candidates))
     return together if believable else known
 
 
@@ -102,7 +96,8 @@ class _Differences:
         while open_to:
             tried = {name: self._fitted([*taken.values(), its], sigma_px) for name, its in open_to.items()}
             best = min(tried, key=lambda name: tried[name][0])
-            if loss - tried[best][0] < LEAST_GAIN:
+            # Half the sum of squares, in units of the expected errors, that a change has to explain to be accepted.
+            if loss - tried[best][0] < 30.0:
                 break
             loss, change = tried[best]
             taken[best] = open_to.pop(best)
@@ -125,10 +120,10 @@ class _Differences:
         scale = np.maximum(np.linalg.norm(jacobian, axis=0), TINY)
         offset, weight = self.offset / sigma_px, np.ones(len(self.offset))
         change = np.zeros(jacobian.shape[1])
-        for _ in range(ROUNDS):
+        for _ in range(4):
             root = np.sqrt(weight)
             rows = np.concatenate([jacobian * root[:, None], known]) / scale
-            change = np.linalg.lstsq(rows, np.append(-offset * root, np.zeros(POSE_NUMBERS)), rcond=HELD)[0] / scale
+            change = np.linalg.lstsq(rows, np.append(-offset * root, np.zeros(POSE_NUMBERS)), rcond=1e-9)[0] / scale
             residual = np.abs(offset + jacobian @ change)
             weight = np.minimum(1.0, HUBER / np.maximum(residual, TINY))
         loss = np.sum(weight * (2 - weight) * residual**2) + np.sum((known @ change) ** 2)

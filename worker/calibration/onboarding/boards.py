@@ -13,10 +13,6 @@ from worker.calibration.geometry.camera import Array
 
 Grey = NDArray[np.uint8]
 
-FEWEST_CORNERS = 8
-"""Fewest corners of a ChArUco board, parts of which may be hidden: fewer do not show how it lies."""
-LARGEST_SEARCH_PX = 1600
-"""Longer side of the picture in which the old detector looks for a board; it finds big squares only."""
 REFINE_WINDOW_PX = 11
 
 
@@ -94,7 +90,8 @@ def _chessboard(photo: Grey, board: Board) -> BoardDetection | None:
 def _by_its_quadrangles(photo: Grey, size: tuple[int, int]) -> NDArray[np.float32] | None:
     """Find a board by OpenCV's older detector, which finds some, with glare or a narrow rim, that the newer one does
     not."""
-    scale = min(1.0, LARGEST_SEARCH_PX / max(photo.shape))
+    # Longer side of the picture in which the old detector looks for a board; it finds big squares only.
+    scale = min(1.0, 1600 / max(photo.shape))
     small = cv2.resize(photo, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
     flags = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_FAST_CHECK
     found, corners = cv2.findChessboardCorners(small, size, flags=flags)
@@ -115,7 +112,8 @@ def _detection(photo: Grey, size: tuple[int, int], board: Board, corners: NDArra
 
 def _charuco(photo: Grey, board: Board) -> BoardDetection | None:
     corners, ids, _, _ = board.charuco_detector.detectBoard(photo)
-    if ids is None or len(ids) < FEWEST_CORNERS:
+    # Fewest corners of a ChArUco board, parts of which may be hidden: fewer do not show how it lies.
+    if ids is None or len(ids) < 8:
         return None
     world = board.corners[np.ravel(ids)]
     if min(np.ptp(world, axis=0)[:2]) == 0:

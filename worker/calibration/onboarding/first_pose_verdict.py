@@ -21,8 +21,6 @@ LARGEST_SIGMA_PX = 60.0
 """Largest rms of clicks, and largest sigma of the field in view, in pixels of a 4K frame: what a calibration still
 catches, with room to spare."""
 HEIGHTS_M = (0.5, HIGHEST_M)
-LARGEST_CHANCE = 1e-3
-"""Largest number of poses that may be expected to explain as much by chance; see `expected_by_chance`."""
 
 
 @dataclass(frozen=True)
@@ -137,7 +135,7 @@ def _rejection(
             "label or the lens is wrong; with more points it can be said which"
         )
     chosen = any(verdict.doubted for verdict in verdicts)
-    if believed.distinct < FEWEST_CLICKS or (chosen and expected_by_chance(clicks, best) > LARGEST_CHANCE):
+    if believed.distinct < FEWEST_CLICKS or (chosen and expected_by_chance(clicks, best) > 1e-3):
         return (
             f"no pose explains more than {len(believed)} of {len(clicks)} points, and as many fit some pose by chance: "
             "check their labels and add more"

@@ -24,8 +24,6 @@ LENS_LADDER: tuple[tuple[str, ...], ...] = (
 FEWEST_SPARE = 6
 """Fewest coordinates beyond the parameters of a fit with which its lens is freed."""
 FOLDS = 10
-SQUARE_WITHIN = 0.02
-"""Deviation from square up to which pixels are square: a board that says otherwise by less was misread."""
 OF_THE_MATRIX = ("fx", "fy", "aspect", "cx", "cy")
 
 
@@ -101,7 +99,8 @@ def two_terms(lens: Lens) -> Lens:
     """
     matrix = lens.matrix.copy()
     matrix[0, 1] = 0.0
-    if abs(matrix[1, 1] / matrix[0, 0] - 1) < SQUARE_WITHIN:
+    # Deviation from square up to which pixels are square: a board that says otherwise by less was misread.
+    if abs(matrix[1, 1] / matrix[0, 0] - 1) < 0.02:
         matrix[0, 0] = matrix[1, 1] = np.sqrt(matrix[0, 0] * matrix[1, 1])
     farthest = np.nanmax(np.linalg.norm(lens.undistort(lens.border(20)), axis=1))
     radius = np.linspace(0.0, farthest, 50)[1:-1]

@@ -31,17 +31,11 @@ from worker.calibration.onboarding.lens_fit import (
     rms,
 )
 
-FEWEST_PHOTOS, FEW_PHOTOS = 4, 10
+FEWEST_PHOTOS = 4
 FOLDS = 5
 ROUNDS = 4
-HURTS, HURTS_PX = 3.0, 1.0
-"""Limit for a photo that hurts: ratio of its error by the others to the median, and least error in px."""
-MOST_LEFT_OUT = 0.3
-BLURRED, BLURRED_PX = 2.0, 6.0
-"""Width of blurred edges, in multiples of the median, and in px."""
 CELLS = (8, 5)
 """Columns and rows of the picture in which corners are counted."""
-FEW_CELLS = 0.6
 UNSURE = 0.01
 """Largest sigma for a field, as a part of the focal length, or of the picture's width for the centre."""
 ZONES = (("top left", "top", "top right"), ("left", "middle", "right"), ("bottom left", "bottom", "bottom right"))
@@ -131,7 +125,7 @@ def calibrate_lens(
     size = _common_size(photos)
     used = {p.name: p.detection for p in photos if p.detection is not None and p.size == size}
     _require_enough(used, photos)
-    most = int(MOST_LEFT_OUT * len(used))
+    most = int(0.3 * len(used))
     hurting: dict[str, float] = {}
     for number in range(ROUNDS):
         chosen = _choose(list(used.values()), size, model, _part(report, number))
@@ -252,7 +246,8 @@ def _jackknife(parts: Array) -> Array:
 
 def _hurting(names: Sequence[str], left_out_px: Array, most: int) -> dict[str, float]:
     """Return the photos, up to `most`, that the others predict far worse than each other."""
-    limit = max(HURTS * float(np.median(left_out_px)), HURTS_PX)
+    # A photo hurts where the others predict it so many times worse than the median, and at least so badly.
+    limit = max(3.0 * float(np.median(left_out_px)), 1.0)
     worst = np.argsort(-left_out_px)[: max(most, 0)]
     return {names[i]: float(left_out_px[i]) for i in worst if left_out_px[i] > limit}
 
@@ -299,7 +294,8 @@ def _verdicts(
     fitted = dict(zip(used, best.fit.by_photo.tolist(), strict=True))
     foretold = dict(hurting) | dict(zip(used, best.left_out_by_photo.tolist(), strict=True))
     edges = [p.detection.edge_px for p in photos if p.detection and p.detection.edge_px]
-    wide = max(BLURRED * float(np.median(edges)), BLURRED_PX) if edges else np.inf
+    # Blurred edges are twice as wide as the median, and at least 6 px.
+    wide = max(2.0 * float(np.median(edges)), 6.0) if edges else np.inf
 
     def fate(photo: Photo) -> Fate:
         if photo.detection is None:
@@ -368,7 +364,7 @@ def _warnings(
     count: int,
 ) -> list[str]:
     found = []
-    if coverage.empty or coverage.share < FEW_CELLS:
+    if coverage.empty or coverage.share < 0.6:
         where = f" and nothing {', '.join(coverage.empty)}" if coverage.empty else ""
         found.append(
             f"the board reached {coverage.share:.0%} of the picture{where}: there the lens is a guess, and with it the "
@@ -390,6 +386,6 @@ def _warnings(
             f"the terms {', '.join(more)} are left at 0: with them the lens foretells photos left out no better "
             f"({richest.left_out_px:.2f} px rms, without them {best.left_out_px:.2f})"
         )
-    if count < FEW_PHOTOS:
+    if count < 10:
         found.append(f"{count} photos are few: 15 to 30 leave less to chance")
     return found

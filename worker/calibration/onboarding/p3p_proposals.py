@@ -16,18 +16,8 @@ from worker.calibration.onboarding.clicks import Clicks
 from worker.calibration.onboarding.exchanged_labels import best_exchanges
 
 TRIPLES = 400
-MOST_LISTED, DRAWN = 24, 4 * TRIPLES
-"""Number of triples drawn from more than `MOST_LISTED` clicks; up to so many clicks all triples are listed."""
 BEGUN_FROM = 6
 """Number of proposed poses that are fitted to the end."""
-PROPOSAL_PX = 16.0
-"""Expected error, in pixels of a 4K frame, of other clicks by a pose from three clicks."""
-LARGEST_EXCHANGE = 4_000_000
-"""Most pairs of clicks times poses for which exchanged labels are tried at once."""
-SAME_M, SAME_DEG = 0.5, 0.5
-"""Distance and angle below which two poses are one."""
-LEAST_AREA = 1e-9
-"""Least area of a triple on the field (m²) times that in the picture at depth 1: triples on a line propose nothing."""
 
 
 def propose_poses(clicks: Clicks, lens: Lens) -> tuple[Array, Array]:
@@ -51,8 +41,9 @@ def _triples(clicks: Clicks, rays: Array) -> Iterator[NDArray[np.intp]]:
     usable = np.flatnonzero(np.isfinite(rays).all(axis=1))
     # A generator of its own keeps the result reproducible.
     rng = np.random.default_rng(0)
-    if len(usable) > MOST_LISTED:
-        every = np.array([rng.choice(usable, 3, replace=False) for _ in range(DRAWN)])
+    # All triples of more clicks are too many.
+    if len(usable) > 24:
+        every = np.array([rng.choice(usable, 3, replace=False) for _ in range(4 * TRIPLES)])
     else:
         every = np.array(list(combinations(usable, 3)))
     if len(every) == 0:
@@ -62,7 +53,9 @@ def _triples(clicks: Clicks, rays: Array) -> Iterator[NDArray[np.intp]]:
     # Large triples are exact, but few clicks are in all of them: half of the sets are any.
     chosen = np.concatenate([order[: TRIPLES // 2], rng.permutation(order[TRIPLES // 2 :])[: TRIPLES // 2]])
     for number in chosen:
-        if size[number] > LEAST_AREA:
+        # Least area of a triple on the field (m²) times that in the picture at depth 1: triples on a line propose
+        # nothing.
+        if size[number] > 1e-9:
             yield every[number]
 
 
@@ -79,7 +72,8 @@ def most_promising_poses(clicks: Clicks, lens: Lens, rotations: Array, positions
         return []
     pixels = project(clicks.world, rotations, positions, lens)
     explained = np.argsort(_soft_costs(np.sum((pixels - clicks.pixel) ** 2, axis=2), lens).sum(axis=1), kind="stable")
-    first = explained[: max(BEGUN_FROM, LARGEST_EXCHANGE // len(clicks) ** 2)]
+    # Most pairs of clicks times poses for which exchanged labels are tried at once.
+    first = explained[: max(BEGUN_FROM, 4_000_000 // len(clicks) ** 2)]
     # [p, i, j]: click i for the point of click j.
     costs = _soft_costs(np.sum((pixels[first, None] - clicks.pixel[:, None]) ** 2, axis=3), lens)
     pairs, spared = best_exchanges(costs)
@@ -97,12 +91,13 @@ def most_promising_poses(clicks: Clicks, lens: Lens, rotations: Array, positions
 
 def _soft_costs(squared: Array, lens: Lens) -> Array:
     """Return the cost of errors of the root of `squared` (...): it grows, but slowly, whatever the scale is."""
-    scale = (PROPOSAL_PX * lens.relative_size) ** 2
+    # Expected error, in pixels of a 4K frame, of other clicks by a pose from three clicks.
+    scale = (16.0 * lens.relative_size) ** 2
     worst = float(max(lens.size)) ** 2
     return np.log1p(np.minimum(np.nan_to_num(squared, nan=worst), worst) / scale)
 
 
 def is_same_pose(first: Pose, second: Pose) -> bool:
     """True if two poses are one."""
-    near = np.linalg.norm(first.position - second.position) < SAME_M
-    return bool(near and rotation_angles_deg(first.rotation, second.rotation) < SAME_DEG)
+    near = np.linalg.norm(first.position - second.position) < 0.5
+    return bool(near and rotation_angles_deg(first.rotation, second.rotation) < 0.5)

@@ -32,13 +32,6 @@ FREE_PARAMETERS = {
 }
 """Parameters of `LENS_PARAMETERS` that clicks may set free, by their names in a fit, where the focal length is its
 logarithm."""
-LEAST_NOISE_PX = (16.0, 8.0, 4.0, CLICK_PX)
-"""Least deviation of a click in the rounds before any click is believed or doubted, in pixels of a 4K frame: a start
-from three clicks fits those exactly, and they alone must not settle how well people click."""
-VERDICTS, STEPS = 4, 6
-"""Rounds in which each click is believed or doubted, and steps of Levenberg-Marquardt with the same weights."""
-UNFIXED = 1e3
-"""Standard deviation (rad, m) of a pose's directions that the clicks do not fix: more than any field has room for."""
 STRONG, AMBIGUOUS = 10.0, 6.0
 """Differences of costs: very strong evidence, and not even positive (Kass and Raftery, "Bayes factors", 1995)."""
 
@@ -108,14 +101,16 @@ def fit(clicks: Clicks, start: Camera, free: tuple[str, ...] = ()) -> PointFit:
     (`FREE_PARAMETERS`)."""
     problem = _Problem(clicks, start.intrinsics, free)
     camera, change = start, np.zeros(len(free))
-    for least in LEAST_NOISE_PX:
+    # Least deviation of a click in the rounds before any click is believed or doubted, in pixels of a 4K frame: a start
+    # from three clicks fits those exactly, and they alone must not settle how well people click.
+    for least in (16.0, 8.0, 4.0, CLICK_PX):
         noise = problem.median_noise(camera, least)
         # Cauchy's weights while the fit may still be far away; then the likelihood's own verdict on each click.
         squared = np.sum(problem.off(camera) ** 2, axis=1) / noise**2
         soft = 1 / (1 + np.nan_to_num(squared, nan=np.inf) / 4)
         camera, change = problem.descend(camera, change, soft / noise**2)
     noise = problem.median_noise(camera, CLICK_PX)
-    for _ in range(VERDICTS):
+    for _ in range(4):
         believed = problem.believed(camera, noise)
         camera, change = problem.descend(camera, change, believed / noise**2)
         noise = problem.noise(camera, believed)
@@ -157,7 +152,7 @@ class _Problem:
     def descend(self, camera: Camera, change: Array, weights: Array) -> tuple[Camera, Array]:
         """Minimise by Levenberg-Marquardt at fixed weights (N,); `change`: of the free parameters so far."""
         damping, loss = 1e-3, self._loss(camera, change, weights)
-        for _ in range(STEPS):
+        for _ in range(6):
             normal, gradient = self._normal(camera, change, weights)
             for _ in range(8):
                 damped = normal + damping * np.diag(np.maximum(np.diag(normal), 1e-12))
@@ -179,7 +174,7 @@ class _Problem:
         """Return the covariance of pose and free parameters, from inverse variances of the clicks (N,)."""
         normal, _ = self._normal(camera, change, weights)
         # A direction that the clicks do not fix has an infinite variance; as good as infinite will do, nothing less.
-        weakest = np.concatenate([np.full(POSE_NUMBERS, UNFIXED**-2), np.zeros(len(self.index))])
+        weakest = np.concatenate([np.full(POSE_NUMBERS, 1e3**-2), np.zeros(len(self.index))])
         return np.linalg.inv(normal + np.diag(weakest)).astype(float)
 
     def median_noise(self, camera: Camera, least: float) -> float:

@@ -33,15 +33,11 @@ from worker.calibration.geometry.rotation import rotation_matrices
 PIXELS_PER_METRE = 10.0
 COARSEST = 32
 """Side, in pixels, of the square that may be one pixel on the coarsest grid."""
-MARKED = 0.5
-"""Segmentation from which there is a line."""
 REACH_PX = 8
 """Distance from a blurred line of the template up to which a union reaches, in pixels of the grid of that blur."""
-LINE_STEP_M, LINE_SAMPLES = 0.02, 6
-"""Step of the drawn template along a line, and number of samples across it."""
+LINE_SAMPLES = 6
+"""Number of samples of the drawn template across a line."""
 MARGIN_M = 2.0
-LEAST_PX_PER_METRE = 6.0
-"""Least height in a 4K frame of a metre of ground, away from the camera, for it to count."""
 LARGEST_UNDISTORTED = 2.5
 """Largest width of undistorted frames, in widths of the frame; wider ones are cut."""
 
@@ -209,7 +205,7 @@ class _PinholeView:
         x, y = np.meshgrid(np.arange(size[0]), np.arange(size[1]))
         plane = (np.stack([x, y], axis=-1) + left_top) / lens.matrix[0, 0]
         undistorted = bilinear(response, lens.distort(plane))
-        return cls((255 * (undistorted >= MARKED)).astype(np.uint8), matrix)
+        return cls((255 * (undistorted >= 0.5)).astype(np.uint8), matrix)
 
 
 @dataclass(frozen=True)
@@ -247,12 +243,13 @@ class _Grid:
         seen = camera.sees(camera.project(self.surface))
         away = self.surface - camera.pose.position
         px_per_metre = camera.intrinsics.focal_length_px * -away[..., 2] / np.sum(away**2, axis=-1)
-        near = px_per_metre >= LEAST_PX_PER_METRE * camera.intrinsics.relative_size
+        # Least height in a 4K frame of a metre of ground, away from the camera, for it to count.
+        near = px_per_metre >= 6.0 * camera.intrinsics.relative_size
         return (255 * (seen & near)).astype(np.uint8)
 
     def lines(self, pitch: Field) -> Picture:
         """Return white lines on black (H, W); a pixel that a line covers in part is grey."""
-        points = pitch.line_points(LINE_STEP_M)
+        points = pitch.line_points(0.02)
         across = (np.arange(LINE_SAMPLES) + 0.5) / LINE_SAMPLES - 0.5
         covered = points.position[:, :2] + (across[:, None] * points.width)[..., None] * points.normal[:, :2]
         area = np.broadcast_to(points.spacing * points.width / LINE_SAMPLES, covered.shape[:2])

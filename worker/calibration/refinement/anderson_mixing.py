@@ -16,13 +16,6 @@ from worker.calibration.geometry.derivatives import POSE_NUMBERS
 from worker.calibration.refinement.estimate import TURN_M, Estimate, GaussNewtonStep
 from worker.calibration.refinement.unknowns import Unknowns
 
-DEPTH = 3
-"""Number of earlier steps that are mixed."""
-HELD = 1e-3
-"""Relative singular value below which changes between steps are taken to be alike."""
-FARTHEST = 4.0
-"""Longest mixed step, in multiples of the plain one."""
-
 
 class MixedSteps:
     """Steps towards a fixed point, each mixed with the ones before."""
@@ -42,15 +35,17 @@ class MixedSteps:
         return replace(here.moved(move, self._unknowns), uneven_m=made.to.uneven_m)
 
     def _mixed(self, plain: Array) -> Array:
-        last = min(DEPTH, len(self._plain))
+        last = min(3, len(self._plain))
         if last == 0:
             return plain
         steps = [*self._plain[-last:], plain]
         changes = np.stack([b - a for a, b in pairwise(steps)], axis=1)
         taken = np.stack(self._taken[-last:], axis=1)
-        share = np.linalg.lstsq(self._in_metres(changes), self._in_metres(plain), rcond=HELD)[0]
+        # Relative singular value below which changes between steps are taken to be alike.
+        share = np.linalg.lstsq(self._in_metres(changes), self._in_metres(plain), rcond=1e-3)[0]
         mixed: Array = plain - (taken + changes) @ share
-        longest = FARTHEST * np.linalg.norm(self._in_metres(plain))
+        # Longest mixed step, in multiples of the plain one.
+        longest = 4.0 * np.linalg.norm(self._in_metres(plain))
         return mixed if np.linalg.norm(self._in_metres(mixed)) <= longest else plain
 
     def _in_metres(self, moves: Array) -> Array:

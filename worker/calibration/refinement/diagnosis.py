@@ -7,10 +7,6 @@ from dataclasses import dataclass, field
 
 from worker.calibration.refinement.uncertainty import Deviation
 
-SURE = 3.0
-"""Sigmas of its estimate by which a parameter is off before it is suspected."""
-NOTABLE = 3.0
-"""Multiples of the sigma of a good calibration by which a parameter is off before it is suspected."""
 MORE_OR_LESS = {
     "focal_length_px": ("a focal length", "px longer", "px shorter"),
     "principal_point_x_px": ("a principal point", "px farther right", "px farther left"),
@@ -49,7 +45,8 @@ def find_suspicions(deviations: Sequence[Deviation]) -> list[Suspicion]:
 
 def is_sure(deviation: Deviation) -> bool:
     """True if the lines contradict a given parameter."""
-    return abs(deviation.value) > max(SURE * deviation.sigma, NOTABLE * deviation.expected)
+    # Three sigmas of the estimate, and three of a good calibration.
+    return abs(deviation.value) > max(3.0 * deviation.sigma, 3.0 * deviation.expected)
 
 
 def _detail(found: Deviation) -> str:

@@ -28,9 +28,6 @@ from worker.calibration.refinement.least_squares import (
 from worker.calibration.refinement.unknowns import Unknowns
 from worker.calibration.robust import tukey_derivatives, tukey_weights
 
-LEAST_HELD, TINY = 1e-9, 1e-300
-"""Relative eigenvalue of the information below which a direction is taken to be unknown."""
-
 
 @dataclass(frozen=True)
 class MarginalInformation:
@@ -166,9 +163,10 @@ def _shrunk_sandwich(information: Array, information_vector: Array, spread: Arra
 
     A few patches of line say little of the variance in any one direction, so it is shrunk to the mean variance.
     """
-    scale = np.sqrt(np.maximum(np.diag(information), TINY))
+    scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
     values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
-    known = values > LEAST_HELD
+    # Directions of less information are taken to be unknown.
+    known = values > 1e-9
     directions, root = vectors[:, known], np.sqrt(values[known])
     whitening = directions / root / scale[:, None]
     variance = whitening.T @ spread @ whitening

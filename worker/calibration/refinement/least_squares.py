@@ -30,8 +30,6 @@ from worker.calibration.robust import USUAL, Weigh, tukey_weights
 FEWEST_MEASUREMENTS = 30
 CLUSTER_POINTS = 40
 """Number of line points (25 cm apart) whose errors of paint, lens and measurement are taken as one."""
-LEAST_BELIEF = 1e-3
-"""Least mean weight of a line point's rows: a point whose rows are all outliers may lie anywhere."""
 LEAST_NOISE = 0.2
 """Least part of the expected errors by which the gradient varies: no picture is perfect."""
 
@@ -192,7 +190,8 @@ def weigh_rows(rows: Sequence[Rows], heights: Array, unknowns: Unknowns, weigh: 
     shared = seen_by[at] > 1
     trust = _joined([r.trust for r in rows])
     of_point = np.bincount(at, belief, len(points)) / np.maximum(np.bincount(at, trust, len(points)), 1e-12)
-    variance = by_itself / np.clip(of_point, LEAST_BELIEF, 1.0)[:, None]
+    # A point whose rows are all outliers may lie anywhere.
+    variance = by_itself / np.clip(of_point, 1e-3, 1.0)[:, None]
     weight = np.where(shared, trust / noise, belief / expected)
     precision, paint_mean = _paint_posterior(local, weight, residual, at, variance)
     if shared.any():

@@ -43,22 +43,15 @@ the largest."""
 UNSTATED_ODDS, STATED_ODDS = FOCAL_SCALES**0.0, FOCAL_SCALES**-3.0
 """Prior odds of `FOCAL_SCALES`: equal for a lens whose sigma nobody stated; a stated sigma is wrong twofold one time
 in nine."""
-LENS_SCALES: Array = 2.0 ** np.arange(6.0)
-"""Possible scales of the errors of the rest of a lens: nothing moves it as far as a zoom ring the focal length, but
-what squeezes pictures moves the aspect by as much."""
 FIELD_SCALES: Array = 2.0 ** np.arange(-3.0, 7.0)
 """Possible scales of a field measure's error: it may have been taken better than expected, or worse."""
 FIELD_ODDS = np.minimum(FIELD_SCALES, 1 / FIELD_SCALES) ** 3.0
 """Prior odds of `FIELD_SCALES`: lines that hardly show a measure are no reason to think it better or worse."""
-LEAST_WIND = 1 / 3
-"""Least part of the wind that is left in the mean of many nights: some of it is the season and not the wind."""
 TOUCHED_SCALES: Array = np.array([[s] * 6 for s in (0.01, 1.0, 4.0, 16.0)] + [[s] * 3 + [0.1] * 3 for s in (4.0, 16.0)])
 """Possible scales of a mount's movement: it stays, or somebody touched it and it moved by `MOVED_RAD` and `MOVED_M`
 times a scale, or only turned."""
 ZOOM_SCALES: Array = np.array([1.0, 4.0, 16.0, 64.0])
 """Possible scales of a focal length's change between views: heat, `HEAT_FOCAL`, or a zoom ring."""
-AIMED_ANEW_RAD = 1.0
-"""Prior sigma of a camera's turn since an earlier epoch, which says nothing of its direction now."""
 MOVED = np.array([MOVED_RAD] * 3 + [MOVED_M] * 3)
 FREE = np.array([PRIOR_RAD] * 3 + [PRIOR_M] * 3)
 ONCE: Array = np.ones(1)
@@ -194,9 +187,11 @@ class _Errors:
         zoomed.append(self._since([tonight]))
         self._changes[camera.id] = np.concatenate([group.which for group in zoomed])
         for view, epoch in zip((anchor, *others), memory.epochs, strict=True):
-            wind = WIND * max(epoch.jobs**-0.5, LEAST_WIND)
+            # Some of the wind is the season, and does not average out.
+            wind = WIND * max(epoch.jobs**-0.5, 1 / 3)
             if view in earlier:
-                wind = np.concatenate([[AIMED_ANEW_RAD] * 3, wind[3:]])
+                # The direction in an earlier epoch says nothing of the direction now.
+                wind = np.concatenate([[1.0] * 3, wind[3:]])
                 self._blocks.append([self._heat([view], ZOOM_SCALES)])
             self._blocks.append([self._move([view], wind, ONCE, change_between(epoch.camera, camera))])
         self._blocks.append([self._move([tonight], WIND, ONCE, np.zeros(POSE_NUMBERS))])
@@ -231,10 +226,12 @@ class _Errors:
         ]
         is_stated = any(name in self._cameras[number].intrinsics.sigma for name in ("fx", "fy"))
         groups = []
+        # Possible scales of the errors of the rest of a lens: nothing moves it as far as a zoom ring the focal length,
+        # but what squeezes pictures moves the aspect by as much.
         for names, scales, odds in (
             ({"focal_length_px"}, FOCAL_SCALES, STATED_ODDS if is_stated else UNSTATED_ODDS),
             ({"aspect"}, FOCAL_SCALES, STATED_ODDS),
-            (set(LENS_PARAMETERS) - {"focal_length_px", "aspect"}, LENS_SCALES, None),
+            (set(LENS_PARAMETERS) - {"focal_length_px", "aspect"}, (2.0 ** np.arange(6.0)), None),
         ):
             its = [p for p in known if p.name in names]
             if its:

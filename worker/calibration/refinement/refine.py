@@ -32,27 +32,11 @@ from worker.calibration.robust import huber_weights, tukey_weights
 
 SEARCH_PX = (14.0, 8.0, 5.0)
 """Half width of the search for lines round by round, in pixels of a 4K frame."""
-LAST_SEARCH_PX = 5.0
-"""Half width of the search in the last rounds, which go on until the cameras stand still. Wide enough that it is the
-robust weights which leave out a line point, and not the end of the search, which moves with the cameras."""
-SPARE_PX = 4.0
-"""Length by which a reading of a frame reaches beyond the search, so that it is good for more than one pose, and
-that of the last round for the evaluation of where it led."""
 EVALUATION_SEARCH_PX = 8.0
 MOST_STEPS = 4
 """Most steps of a coarse round."""
-MOST_READINGS, MOST_LAST_STEPS = 6, 12
-"""Most readings of the frames in the last rounds, and most steps on each reading."""
-MISFIT_FLATTENS_PX = 0.3
-"""Misfit at which the ground is taken for half as uneven as its heights say."""
-SETTLED_M = 2e-4
-"""Move below which a step has converged on these measurements."""
-ARRIVED_M, NEARER, PATIENCE = 5e-5, 0.1, 3
-"""Ends of the last steps: a move less than this, or than such a part of the first step on the same reading, or so
-many steps no shorter than one before: a line point that fits two shifts alike may go to and fro."""
-READ_ALIKE_M, LEAST_NEARER = 1e-4, 0.2
-"""Move below which the next reading of the frames would leave the cameras where they are. Each reading moves them by
-about the same part of what the one before did, and by no less than `LEAST_NEARER` of it."""
+PATIENCE = 3
+"""Steps no shorter than one before after which the last steps end."""
 NOT_LOOKED_AT: NDArray[np.float32] = np.zeros((1, 1), dtype=np.float32)
 """Response to a frame that the network was not run on: a marking nowhere."""
 
@@ -98,7 +82,9 @@ class LineReader:
             profiles = self._read.get(number)
             if profiles is None or not profiles.cover(camera, lines, search):
                 channels, response = self._observations.channels[number], self._observations.responses[number]
-                profiles = LineProfiles.read(lines, camera, channels, response, search + SPARE_PX)
+                # Length by which a reading of a frame reaches beyond the search, so that it is good for more than one
+                # pose, and that of the last round for the evaluation of where it led.
+                profiles = LineProfiles.read(lines, camera, channels, response, search + 4.0)
                 self._read[number] = profiles
             measured.append(profiles.measure(camera, lines, search))
         return measured
@@ -199,12 +185,14 @@ class _Refiner:
         """
         moves = list[float]()
         self.reader.read_anew()
-        for _ in range(MOST_READINGS):
+        for _ in range(6):
             last = replace(self.around(here), found=here.cameras).follow(here)
             moves.append(last.to.largest_move_m(here))
             here = last.to
             nearer = moves[-1] / moves[-2] if len(moves) > 1 else 1.0
-            if moves[-1] * max(nearer, LEAST_NEARER) < READ_ALIKE_M:
+            # Each reading moves the cameras by about the same part of what the one before did, and by no less than a
+            # fifth of it: they have arrived where the next one would move them less than 0.1 mm.
+            if moves[-1] * max(nearer, 0.2) < 1e-4:
                 break
             self.reader.read_anew()
         return last
@@ -212,10 +200,16 @@ class _Refiner:
     def follow(self, here: Estimate) -> GaussNewtonStep:
         """Return the last of the steps to the lines as the frames have been read."""
         mixed, lengths = MixedSteps(self.unknowns), list[float]()
-        for _ in range(MOST_LAST_STEPS):
-            last = self.towards_tukey(here, self.measure(here, LAST_SEARCH_PX))
+        for _ in range(12):
+            # Half width of the search in the last rounds, which go on until the cameras stand still. Wide enough that
+            # it is the robust weights which leave out a line point, and not the end of the search, which moves with the
+            # cameras.
+            last = self.towards_tukey(here, self.measure(here, 5.0))
             lengths.append(last.to.largest_move_m(here))
-            if lengths[-1] < max(ARRIVED_M, NEARER * lengths[0]) or min(lengths[-PATIENCE:]) > min(
+            # They end when cameras move less than this, or than such a part of the first step on the same reading, or
+            # when so many steps were no shorter than one before: a line point that fits two shifts alike may go to and
+            # fro.
+            if lengths[-1] < max(5e-5, 0.1 * lengths[0]) or min(lengths[-PATIENCE:]) > min(
                 lengths[:-PATIENCE], default=np.inf
             ):
                 break
@@ -229,7 +223,7 @@ class _Refiner:
             here = gauss_newton_step(
                 here, self.found, with_misfit_noise(here, measured), self.unknowns, huber_weights
             ).to
-            if here.largest_move_m(before) < SETTLED_M:
+            if here.largest_move_m(before) < 2e-4:
                 break
         return here
 
@@ -239,7 +233,7 @@ class _Refiner:
         made = gauss_newton_step(here, self.found, measured, self.unknowns, tukey_weights)
         uneven = made.unevenness(self.unknowns, self.unknowns.ground.even)
         # A lens or a field that is wrong bends lines as a swelling ground does: the more of it, the flatter the ground.
-        uneven /= 1 + (max(found.misfit_px for found in measured) / MISFIT_FLATTENS_PX) ** 2
+        uneven /= 1 + (max(found.misfit_px for found in measured) / 0.3) ** 2
         return replace(made, to=replace(made.to, uneven_m=min(uneven, self.unknowns.ground.most_m)))
 
 

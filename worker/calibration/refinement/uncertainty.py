@@ -41,16 +41,7 @@ from worker.calibration.refinement.priors import Priors, build_priors, unknowns_
 from worker.calibration.refinement.unknowns import Unknowns
 from worker.calibration.refinement.variance_components import Posterior, posterior
 
-SURE_CHANGE = 3.0
-"""Sigmas, of estimate and heat together, by which a focal length differs when it has changed."""
 FOCAL = "focal_length_px"
-WORST_MARKINGS = 0.95
-"""Quantile of the line points in view that stands for the worst: nobody measures at the last one at the rim of the
-picture."""
-ASKED_MARKINGS = 200
-"""Number of line points that are evaluated."""
-ASKED_AGAIN = 2
-"""Number of times that lines are weighed again at the current estimate of everything."""
 
 
 @dataclass(frozen=True)
@@ -113,7 +104,8 @@ class GroundSigma:
         Where a pixel covers metres of far grass, no frame tells the place of a marking any better than the pixel.
         """
         beyond = np.minimum(self.metres / metres, self.pixels / pixels)
-        at = int(np.argsort(beyond)[int(WORST_MARKINGS * (len(beyond) - 1))])
+        # Nobody measures at the last marking at the rim of the picture.
+        at = int(np.argsort(beyond)[int(0.95 * (len(beyond) - 1))])
         return float(self.metres[at]), float(self.pixels[at]), bool(beyond[at] > 1)
 
 
@@ -147,7 +139,8 @@ class LensChange:
     @property
     def notable(self) -> bool:
         """True if the change is surely more than heat does to a lens."""
-        return abs(self.longer) > SURE_CHANGE * float(np.hypot(self.sigma, HEAT_FOCAL))
+        # Sigmas, of estimate and heat together, by which a focal length differs when it has changed.
+        return abs(self.longer) > 3.0 * float(np.hypot(self.sigma, HEAT_FOCAL))
 
 
 def _not_cross_checked() -> CrossCheck | None:
@@ -241,7 +234,8 @@ def estimate_uncertainty(
     lines = LineLikelihood(here, measured, memories, unknowns)
     information = lines.information()
     believed = build_priors(here, stored, memories, unknowns, solved, information.matrix)
-    for _ in range(ASKED_AGAIN):
+    # Number of times that lines are weighed again at the current estimate of everything.
+    for _ in range(2):
         changes = believed.mixing @ _posterior(believed, information).value
         information = lines.information_at(changes, information.heights(changes))
     joint = _JointPosterior.of(here, believed, information)
@@ -381,7 +375,7 @@ class _JointPosterior:
         index = VisibleLines.from_camera(self.here.lines, camera).index
         if len(index) == 0:
             return None
-        index = index[:: max(len(index) // ASKED_MARKINGS, 1)]
+        index = index[:: max(len(index) // 200, 1)]
         jacobian = full_pixel_jacobian(camera, self.here.lines.position[index])
         by_ground, all_of_it = -jacobian[..., 3:6], both
         for at, parameter in enumerate(self.believed.unknowns.parameters, POSE_NUMBERS * self.believed.unknowns.views):

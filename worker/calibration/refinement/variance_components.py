@@ -18,8 +18,6 @@ from numpy.typing import NDArray
 
 from worker.calibration.geometry.camera import Array
 
-SWEEPS = 3
-
 
 @dataclass(frozen=True)
 class Group:
@@ -62,7 +60,7 @@ def posterior(information: Array, information_vector: Array, blocks: Sequence[Se
         mean[group.which] = group.mean
         certainty[group.which] = group.certainty(group.scales[0])
     choices = [block for block in blocks if any(len(group.scales) > 1 for group in block)]
-    for _ in range(SWEEPS):
+    for _ in range(3):
         before = certainty.copy()
         for block in choices:
             which = np.concatenate([group.which for group in block])

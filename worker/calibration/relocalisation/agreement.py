@@ -13,14 +13,6 @@ from worker.calibration.relocalisation.line_view import WIDTH_PX, LineView
 AT_ONCE = 1024
 NEAREST_M = 0.3
 HALF_WIDTH_PX = WIDTH_PX / 2
-LONGEST_STEP_PX = 25.0
-"""Longest counted distance between two points of a marking in the view, view pixels."""
-UNSEEN_PX = 40.0
-"""Length of line that is taken for missing from every view, so that little in view is not all in view."""
-FEWEST_POINTS = 30
-"""Fewest points of markings in view for an agreement to count in full."""
-ROLLED = 0.01
-"""Agreement that a roll of one standard deviation costs."""
 LOWEST_M = 1.2
 """Least height of a sought camera: from the ground everything can be explained by a few lines."""
 
@@ -41,8 +33,11 @@ def agreement(field: FieldMap, view: LineView, cameras: Hypotheses, tolerance_px
 def _agreement(field: FieldMap, view: LineView, cameras: Hypotheses, tolerance: float) -> Array:
     expected, found, points = _expected_and_found(field, view, cameras, tolerance)
     explained = _explained(field, view, cameras, tolerance) * view.painted_px
-    dice = (found + explained) / (expected + view.painted_px + UNSEEN_PX) * np.minimum(1.0, points / FEWEST_POINTS)
-    rolled = ROLLED * (cameras.rotations[:, 0, 2] / np.sin(view.roll_sigma)) ** 2
+    # Length of line that is taken for missing from every view, so that little in view is not all in view.
+    # Fewest points of markings in view for an agreement to count in full.
+    dice = (found + explained) / (expected + view.painted_px + 40.0) * np.minimum(1.0, points / 30)
+    # Agreement that a roll of one standard deviation costs.
+    rolled = 0.01 * (cameras.rotations[:, 0, 2] / np.sin(view.roll_sigma)) ** 2
     return np.where(cameras.positions[:, 2] > LOWEST_M, dice - rolled, 0.0)
 
 
@@ -70,7 +65,8 @@ def _expected_and_found(
     row, column = np.where(seen, row, 0), np.where(seen, column, 0)
     counted = seen & view.covered[row, column] & field.joined
     steps = np.hypot(np.diff(x, axis=1, append=x[:, -1:]), np.diff(y, axis=1, append=y[:, -1:]))
-    lengths = np.minimum(steps, LONGEST_STEP_PX) * counted
+    # Longest counted distance between two points of a marking in the view, view pixels.
+    lengths = np.minimum(steps, 25.0) * counted
     near = np.exp(-((view.distance[row, column] / tolerance) ** 2))
     return lengths.sum(axis=1), (lengths * near).sum(axis=1), counted.sum(axis=1)
 

@@ -17,18 +17,12 @@ from worker.calibration.relocalisation.field_map import FieldMap
 from worker.calibration.relocalisation.hypotheses import FARTHEST_BENT, Hypotheses, LensSteps
 from worker.calibration.relocalisation.line_view import LineView
 
-STEPS = 3
-TURN_RAD, SHIFT = 0.05, 0.06
-"""Standard deviation of a hypothesis: of its turn, and of its place as a part of the distance to what it sees."""
-NOISE_PX = 2.0
-"""Standard deviation of a point of paint measured across its line, view pixels: neighbours share errors."""
-
 
 def aligned(
     field: FieldMap, view: LineView, cameras: Hypotheses, scores: Array, tolerance_px: float, lens: LensSteps
 ) -> tuple[Hypotheses, Array]:
     """Return each hypothesis (P,) moved onto the paint as long as its agreement grows, and the agreements."""
-    for _ in range(STEPS):
+    for _ in range(3):
         moved = _stepped(field, view, cameras, tolerance_px, lens)
         of_moved = agreement(field, view, moved, tolerance_px)
         better = of_moved > scores
@@ -56,7 +50,8 @@ def _stepped(field: FieldMap, view: LineView, cameras: Hypotheses, tolerance_px:
     counted = ahead & in_view & field.joined & (length > 1e-9)
     across = np.stack([-along[..., 1], along[..., 0]], axis=-1) / np.where(counted, length, 1.0)[..., None]
     off = (to_paint * across).sum(axis=-1)
-    weights = np.where(counted, np.exp(-((to_paint**2).sum(axis=-1) / tolerance_px**2)), 0.0) / NOISE_PX**2
+    # Standard deviation of a point of paint measured across its line, view pixels: neighbours share errors.
+    weights = np.where(counted, np.exp(-((to_paint**2).sum(axis=-1) / tolerance_px**2)), 0.0) / 2.0**2
 
     push = np.concatenate([focal[..., None] * across, -(seen * across).sum(axis=-1, keepdims=True)], axis=-1)
     push /= depth[..., None]
@@ -68,7 +63,8 @@ def _stepped(field: FieldMap, view: LineView, cameras: Hypotheses, tolerance_px:
     # Without counted points nothing is measured, and the step is none.
     reach = np.where(reach > 0, reach, 1.0)
     spread = np.empty((len(cameras), 8))
-    spread[:, :3], spread[:, 3:6] = TURN_RAD, SHIFT * reach[:, None]
+    # Standard deviation of a hypothesis: of its turn, and of its place as a part of the distance to what it sees.
+    spread[:, :3], spread[:, 3:6] = 0.05, 0.06 * reach[:, None]
     spread[:, 6:] = lens.focal or 1.0, lens.bend or 1.0
     weighted = jacobian * weights[..., None]
     information = np.swapaxes(jacobian, 1, 2) @ weighted + np.eye(8) / spread[:, None] ** 2

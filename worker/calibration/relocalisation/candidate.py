@@ -21,17 +21,6 @@ from worker.calibration.refinement.uncertainty import RefinedPose, Sigma
 from worker.calibration.relocalisation.paint import Paint, share
 from worker.calibration.relocalisation.sought import SoughtCamera
 
-FAR_SEARCH_PX = (60.0, 28.0, 14.0, 8.0, 5.0)
-"""Half width of the search for lines of a proposal round by round, in pixels of a 4K frame, where an ordinary
-refinement sees some of the lines and not all. Most proposals are right to a pixel or two, and from there what lies
-farther off may be blotches of snow and worn grass; of others some lines are caught and one is taken for its
-neighbour."""
-HARDLY_SEEN, WELL_SEEN = 0.3, 0.9
-"""Shares of the expected lines, beyond chance. A pose that sees less than the first has none near that sees more, as
-a rule; a pose that sees more than the second is left as it is."""
-CLEARLY_MORE = 0.03
-"""Agreement by which a pose farther from its lines has to be better."""
-
 
 @dataclass(frozen=True)
 class Candidate:
@@ -86,11 +75,16 @@ class FrameObservations:
     def on_lines_farther_off(self, camera: Camera, close: Candidate, sought: SoughtCamera) -> Candidate:
         """Refine a proposed camera onto lines farther off; return it if it is better than `close`, by the lines
         close by."""
-        if not HARDLY_SEEN < close.evidence.agreement < WELL_SEEN:
+        # A pose that sees less has none near that sees more, as a rule; one that sees more is left as it is.
+        if not 0.3 < close.evidence.agreement < 0.9:
             return close
         # Principal point and k2 would be bent for the sake of lines that are not caught yet.
         first = free_focal_length_and_k1(0, camera) if sought.is_lens_sought else []
-        caught = refine(self.field, [camera], self.observations, 0.0, first, FAR_SEARCH_PX).each[0]
+        # Half width of the search for lines of a proposal round by round, in pixels of a 4K frame, where an ordinary
+        # refinement sees some of the lines and not all. Most proposals are right to a pixel or two, and from there what
+        # lies farther off may be blotches of snow and worn grass; of others some lines are caught and one is taken for
+        # its neighbour.
+        caught = refine(self.field, [camera], self.observations, 0.0, first, (60.0, 28.0, 14.0, 8.0, 5.0)).each[0]
         far = self.candidate(caught.camera, sought) if sought.is_lens_sought else self.assessed(caught, sought)
         return far if is_better(far, close) else close
 
@@ -112,7 +106,8 @@ class FrameObservations:
 def is_better(one: Candidate, other: Candidate) -> bool:
     """True if one agrees clearly more with lines and paint than the other, or about as much with lines closer to it."""
     more = one.agreement - other.agreement
-    if abs(more) > CLEARLY_MORE or one.residual_px is None or other.residual_px is None:
+    # Agreement by which a pose farther from its lines has to be better.
+    if abs(more) > 0.03 or one.residual_px is None or other.residual_px is None:
         return more > 0
     return one.residual_px < other.residual_px
 

@@ -19,11 +19,6 @@ from worker.calibration.refinement.refine import Observations, refine
 from worker.calibration.relocalisation.candidate import Candidate, FrameObservations, free_lens
 from worker.calibration.relocalisation.sought import SoughtCamera
 
-LOWEST_M, SIGMAS = 0.05, 5.0
-"""Least height of a ridge to be taken, in metres and in its standard deviations."""
-LESS_LEFT = 0.85
-"""Largest ratio of the lines' rms distance from the cameras with a ridge to that on a flat field."""
-
 
 @dataclass(frozen=True)
 class CrownedField:
@@ -51,11 +46,13 @@ def find_crown(
     ]
     found = refine(flat, cameras, observations, 0.0, [*lenses, *free_ridge(flat)])
     height_m, sigma_m = found.pitch.ridge_height, found.parameter_uncertainties[-1].sigma
-    if not max(LOWEST_M, SIGMAS * sigma_m) < height_m < Gate().highest_ridge_m:
+    # It is at least 5 cm high, and five of its standard deviations.
+    if not max(0.05, 5.0 * sigma_m) < height_m < Gate().highest_ridge_m:
         return None
     observed = map(partial(FrameObservations.of, found.pitch), observations.channels, observations.responses)
     refined = [frame.assessed(pose, one) for frame, pose, one in zip(observed, found.each, sought, strict=True)]
-    if not _rms(refined) < LESS_LEFT * _rms(candidates):
+    # Largest ratio of the lines' rms distance from the cameras with a ridge to that on a flat field.
+    if not _rms(refined) < 0.85 * _rms(candidates):
         return None
     return CrownedField(found.pitch, refined)
 

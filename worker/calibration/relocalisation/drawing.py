@@ -9,9 +9,6 @@ from worker.calibration.relocalisation.field_map import FieldMap
 from worker.calibration.relocalisation.hypotheses import Hypotheses, rotations_of
 
 NEAREST_M, LOWEST_M, HIGHEST_M = 0.5, 2.0, 35.0
-FARTHEST_BESIDE_M, FARTHEST_BEHIND_M = 60.0, 40.0
-"""Distance of cameras beside the long sides, and behind the ends; a larger field is filmed from as far as it is
-large."""
 BESIDE, AIMED_AT = 1.3, 1.1
 """Range of cameras along a side, and of the places they aim at, in half sizes of the field."""
 
@@ -23,8 +20,9 @@ def draw(field: FieldMap, focal_px: Array, roll_sigma: float, count: int, rng: n
     """
     half_x, half_y = field.half_size.tolist()
     behind_an_end = rng.integers(0, 3, count) == 2
-    beside = half_y + _log_uniform(NEAREST_M, max(FARTHEST_BESIDE_M, half_y), count, rng)
-    behind = half_x + _log_uniform(NEAREST_M, max(FARTHEST_BEHIND_M, half_x), count, rng)
+    # A larger field is filmed from as far as it is large.
+    beside = half_y + _log_uniform(NEAREST_M, max(60.0, half_y), count, rng)
+    behind = half_x + _log_uniform(NEAREST_M, max(40.0, half_x), count, rng)
     x = np.where(behind_an_end, -behind, rng.uniform(-BESIDE * half_x, BESIDE * half_x, count))
     y = np.where(behind_an_end, rng.uniform(-BESIDE * half_y, BESIDE * half_y, count), -beside)
     if not field.is_symmetric:

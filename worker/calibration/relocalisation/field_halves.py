@@ -12,13 +12,6 @@ from worker.calibration.relocalisation.relocalise import twin
 from worker.calibration.relocalisation.shared_ground import GroundComparison, SharedGround
 from worker.calibration.relocalisation.sought import Place
 
-ON_ONE_MOUNT = 0.25
-"""Ratio of distances below which a camera is taken to be on the mount of another rather than its twin."""
-SPEAKS_AGAINST = 0.1
-"""Correlation by which the ground may speak for the twin without overruling the distance: stands may be alike."""
-BEHIND_AN_END = 0.5
-"""Ratio of y to x of a camera below which it is told by left and right, not by near and far."""
-
 
 @dataclass(frozen=True)
 class ChosenSide:
@@ -67,7 +60,8 @@ def choose_sides(
 def side_of(camera: Camera) -> str:
     """Return the side of the field that a camera stands on, in a word."""
     x, y, _ = camera.pose.position
-    if abs(y) < BEHIND_AN_END * abs(x):
+    # Ratio of y to x of a camera below which it is told by left and right, not by near and far.
+    if abs(y) < 0.5 * abs(x):
         return "left" if x < 0 else "right"
     return "near" if y < 0 else "far"
 
@@ -100,7 +94,8 @@ def _beside_the_others(camera: Camera, standing: Sequence[Camera], compared: Gro
     nearer = int(np.argmin(metres))
     taken, near, far = sides[nearer], metres[nearer], metres[1 - nearer]
     alike, otherwise = compared.correlations[nearer], compared.correlations[1 - nearer]
-    if near <= ON_ONE_MOUNT * far and alike > otherwise - SPEAKS_AGAINST:
+    # Stands may be alike: the ground may speak a little for the other side.
+    if near <= 0.25 * far and alike > otherwise - 0.1:
         return ChosenSide(
             taken, f"taken to stand on the {side_of(taken)} side, {near:.1f} m from the nearest camera", decided=True
         )

@@ -13,18 +13,9 @@ from worker.calibration.geometry.camera import Array
 from worker.calibration.geometry.field import Field, Marking
 from worker.calibration.relocalisation.line_view import labelled_places
 
-POINTS = 420
-"""Approximate number of points on the markings that each pose of a population projects."""
 FINE_M = 0.1
 BEYOND_M = 6.0
 """Margin of the map of distances beside the markings of the field."""
-CELLS_A_SIDE = 700
-"""Approximate number of cells of the map of distances along the field; never finer than 5 cm."""
-SHORTEST_LINE = 0.03
-"""Least length of a straight piece, as a part of the longer side of the field: shorter ones (ticks, dashes) name no
-line that an image line could be."""
-SAME_LINE_M = 0.3
-"""Largest distance of a place from the nearest marking after half a turn of a symmetric field."""
 ALIKE_M = 0.05
 """Difference of radii below which circles are of one size."""
 
@@ -54,12 +45,16 @@ class FieldMap:
         """Return the map of a field, its roof included; spots are too small to be seen from afar."""
         lines = [marking for marking in field.markings() if not marking.spot]
         fine = [_resampled(line, FINE_M) for line in lines]
-        step = max(FINE_M, FINE_M * sum(len(points) for points in fine) / POINTS)
+        # Approximate number of points on the markings that each pose of a population projects.
+        step = max(FINE_M, FINE_M * sum(len(points) for points in fine) / 420)
         coarse = [_resampled(line, step) for line in lines]
         everywhere = np.concatenate(fine)
         half = np.abs(everywhere).max(axis=0)
-        cell = max(0.05, 2 * float(half.max()) / CELLS_A_SIDE)
-        shortest = SHORTEST_LINE * 2 * float(half.max())
+        # Approximate number of cells of the map of distances along the field; never finer than 5 cm.
+        cell = max(0.05, 2 * float(half.max()) / 700)
+        # Least length of a straight piece, as a part of the longer side of the field: shorter ones (ticks, dashes) name
+        # no line that an image line could be.
+        shortest = 0.03 * 2 * float(half.max())
         return cls(
             field.lift(np.concatenate(coarse)).astype(np.float32),
             np.concatenate([np.arange(len(points)) < len(points) - 1 for points in coarse]),
@@ -85,7 +80,7 @@ class FieldMap:
         """True if the field turned by half a turn looks the same, so that each view has a twin."""
         turned = -self.points[:, :2].astype(float)
         row, column = self.cells(turned[:, 0], turned[:, 1])
-        return bool(np.linalg.norm(self.nearest[row, column], axis=-1).max() < SAME_LINE_M)
+        return bool(np.linalg.norm(self.nearest[row, column], axis=-1).max() < 0.3)
 
 
 def _resampled(line: Marking, step: float) -> Array:

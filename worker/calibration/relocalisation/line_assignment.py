@@ -20,16 +20,7 @@ from worker.calibration.relocalisation.rotation_voting import Direction
 
 ALONG = 0.012
 """Largest angle, rad, between the plane of a segment and a direction along which it runs."""
-HIGHEST_M, HEIGHTS = 50.0, 22
-TOGETHER = 0.01
-"""Relative difference of measures below which segments are pieces of one line."""
-MOST_LINES = 9
-OFF_M, OFF_OF_HEIGHT = 0.1, 0.02
-"""Distance of a line from its marking at which it counts 1/e: in metres, and as a part of the height of the camera."""
-TRIED_FIRST, TRIED_SECOND = 40, 6
-"""Matches on the first axis that are pursued, and on the second for each of them."""
-ALONG_THE_FIELD = 14
-"""Number of places along the field that are tried where nothing measures the second axis."""
+HIGHEST_M = 50.0
 BESIDE = 1.3
 
 
@@ -70,11 +61,12 @@ def _lines(measures: Array, lengths: Array) -> tuple[Array, Array]:
     measures, lengths = measures[order], lengths[order]
     if len(measures) == 0:
         return measures, lengths
-    new = np.diff(measures, prepend=measures[0]) >= TOGETHER * (1 + np.abs(measures))
+    # Relative difference of measures below which segments are pieces of one line.
+    new = np.diff(measures, prepend=measures[0]) >= 0.01 * (1 + np.abs(measures))
     line = np.cumsum(new)
     weight = np.bincount(line, lengths)
     mean = np.bincount(line, lengths * measures) / weight
-    longest = np.argsort(-weight)[:MOST_LINES]
+    longest = np.argsort(-weight)[:9]
     return mean[longest], weight[longest].astype(float)
 
 
@@ -85,15 +77,16 @@ def _matched(
     scaled = _heights_and_places(first[0], first_markings)
     scores = _score(first, first_markings, *scaled.T)
     found = []
-    for n in np.argsort(-scores)[:TRIED_FIRST]:
+    for n in np.argsort(-scores)[:40]:
         height, place = scaled[n].tolist()
         if len(second[0]) and len(second_markings):
             places = (second_markings[None] - height * second[0][:, None]).ravel()
             others = _score(second, second_markings, np.full(len(places), height), places)
-            best = np.argsort(-others)[:TRIED_SECOND]
+            best = np.argsort(-others)[:6]
             found += [(height, place, float(places[m]), float(scores[n] + others[m])) for m in best]
         else:
-            places = np.linspace(-BESIDE * half, BESIDE * half, ALONG_THE_FIELD)
+            # Nothing measures the second axis.
+            places = np.linspace(-BESIDE * half, BESIDE * half, 14)
             found += [(height, place, float(other), float(scores[n])) for other in places]
     return found
 
@@ -109,7 +102,7 @@ def _heights_and_places(measures: Array, markings: Array) -> Array:
     possible = (height > LOWEST_M) & (height < HIGHEST_M)
     by_two = np.stack([height[possible], place[possible]], axis=1)
 
-    usual = np.geomspace(LOWEST_M, HIGHEST_M, HEIGHTS)[:, None, None]
+    usual = np.geomspace(LOWEST_M, HIGHEST_M, 22)[:, None, None]
     by_one = np.stack(np.broadcast_arrays(usual, markings - usual * measures[:2, None]), axis=-1).reshape(-1, 2)
     return np.concatenate([by_two, by_one])
 
@@ -126,5 +119,6 @@ def _score(lines: tuple[Array, Array], markings: Array, heights: Array, places: 
     measures, lengths = lines
     at = heights[:, None] * measures + places[:, None]
     off = np.abs(at - markings[np.searchsorted((markings[1:] + markings[:-1]) / 2, at)])
-    near = np.exp(-((off / (OFF_M + OFF_OF_HEIGHT * heights[:, None])) ** 2))
+    # Distance from its marking at which a line counts 1/e: so much, and a part of the height of the camera.
+    near = np.exp(-((off / (0.1 + 0.02 * heights[:, None])) ** 2))
     return np.asarray(near @ lengths / lengths.sum())

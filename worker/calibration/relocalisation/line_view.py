@@ -16,15 +16,6 @@ WIDTH_PX = 480
 """Width of a frame in view pixels: hypotheses differ by as little as half a pixel of it."""
 WIDEST = 1.3
 """Limit of undistorted views from the principal point, in widths of a frame."""
-PAINT = 110
-"""Response, 0..255, from which a pixel of the shrunk response is paint."""
-FARTHEST_PX = 60.0
-"""Largest distance to paint, view pixels; longer ones are cut."""
-MOST_SEGMENTS, SHORTEST_SEGMENT_PX = 140, 10.0
-PLACES = 320
-"""Number of places on paint that each pose of a population projects to the ground."""
-BORDER_POINTS = 60
-"""Points on each side of the frame's border."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +50,7 @@ class LineView:
         small = np.asarray(
             cv2.resize(response, (2 * WIDTH_PX, round(2 * height * scale)), interpolation=cv2.INTER_AREA), np.uint8
         )
-        border = _undistorted(lens.border(BORDER_POINTS), lens, focal)
+        border = _undistorted(lens.border(60), lens, focal)
         low = np.maximum(border.min(axis=0), -WIDEST * WIDTH_PX)
         high = np.minimum(border.max(axis=0), WIDEST * WIDTH_PX)
         shape = tuple(np.floor(high - low).astype(int)[::-1] + 1)
@@ -69,14 +60,15 @@ class LineView:
         covered = np.zeros(shape, np.uint8)
         cv2.fillPoly(covered, [np.rint(border - low).astype(np.int32)], 1)
         distance, label = cv2.distanceTransformWithLabels(free, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
-        chosen = np.random.default_rng(1).permutation(len(cells))[:PLACES]
+        # Number of places on paint that each pose of a population projects to the ground.
+        chosen = np.random.default_rng(1).permutation(len(cells))[:320]
         starts, ends = _segments(small, lens, focal, 2 * scale)
         return cls(
             focal,
             1 / scale,
             (cells[chosen] + low).astype(np.float32),
             float(len(cells)),
-            np.minimum(distance, FARTHEST_PX).astype(np.float32),
+            np.minimum(distance, 60.0).astype(np.float32),
             labelled_places(np.asarray(label), free),
             covered.astype(bool),
             low,
@@ -124,7 +116,8 @@ def labelled_places(label: NDArray[Any], free: NDArray[np.uint8]) -> NDArray[np.
 
 def middles_of_paint(small: NDArray[np.uint8]) -> Array:
     """Return pixels (n, 2) of the shrunk response on the middles of what is painted."""
-    depth = cv2.distanceTransform((small > PAINT).astype(np.uint8), cv2.DIST_L2, 5)
+    # Response, 0..255, from which a pixel of the shrunk response is paint.
+    depth = cv2.distanceTransform((small > 110).astype(np.uint8), cv2.DIST_L2, 5)
     middle = (depth > 0) & (depth >= cv2.dilate(depth, np.ones((3, 3), np.uint8)) - 0.25)
     row, column = np.nonzero(middle)
     return np.stack([column, row], axis=1).astype(float)
@@ -143,6 +136,6 @@ def _segments(small: NDArray[np.uint8], lens: Lens, focal: float, scale: float) 
     pixels = (np.zeros((0, 4)) if found is None else found.reshape(-1, 4)) / scale
     starts, ends = (lens.undistort(pixels[:, part]) * focal for part in (slice(0, 2), slice(2, 4)))
     length = np.linalg.norm(ends - starts, axis=1)
-    longest = np.argsort(-np.nan_to_num(length))[:MOST_SEGMENTS]
-    longest = longest[np.nan_to_num(length[longest]) >= SHORTEST_SEGMENT_PX]
+    longest = np.argsort(-np.nan_to_num(length))[:140]
+    longest = longest[np.nan_to_num(length[longest]) >= 10.0]
     return starts[longest], ends[longest]

@@ -15,8 +15,6 @@ from worker.calibration.geometry.visibility import VisibleLines
 from worker.calibration.relocalisation.line_view import middles_of_paint
 
 WIDTH_PX = 960
-TOLERANCE_PX = 3.0
-"""Distance from an expected line within which it explains paint, in pixels of the shrunk frame."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +38,8 @@ class Paint:
     def on_markings(self, field: Field, camera: Camera) -> NDArray[np.bool_]:
         """True for places (n,) on a marking as a camera puts it, on the roof of the field."""
         small = camera.with_lens(camera.intrinsics.scaled(WIDTH_PX / camera.intrinsics.size[0]))
-        band = line_band(VisibleLines.from_camera(field.line_points(), small), small.intrinsics.size, TOLERANCE_PX)
+        # Distance from an expected line within which it explains paint, in pixels of the shrunk frame.
+        band = line_band(VisibleLines.from_camera(field.line_points(), small), small.intrinsics.size, 3.0)
         column, row = self.middles.T
         inside = row < band.shape[0]
         return inside & (band[np.minimum(row, band.shape[0] - 1), column] > 0)

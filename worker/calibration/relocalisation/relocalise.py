@@ -30,24 +30,10 @@ TOO_LITTLE_PAINT = frozenset({"no-lines", "few-lines"})
 BEGUN_ANEW = TOO_LITTLE_PAINT | {"lines"}
 BEGUN_ANEW_WITH_OTHER_LENSES = BEGUN_ANEW | {"implausible", "not-unique"}
 """Reasons after which the search begins anew with other draws, through other lenses if there are any."""
-FAINT = 1.6
-"""Factor on the network's probabilities in a new attempt, if there was too little paint or after one without it:
-then faint paint is paint as well, and so is more that is none."""
-ATTEMPTS_KNOWN_LENS, ATTEMPTS_SOUGHT_LENS = 3, 2
-"""Most attempts: to search for a lens too is dear."""
-REFINED, MUCH_WORSE = 4, 0.12
-"""Most proposals that are refined, and how much less their agreement may be than that of the best."""
-LOOKED_FARTHER_KNOWN_LENS, LOOKED_FARTHER_SOUGHT_LENS = REFINED, 2
-"""Number of those, the best ones, for which lines are looked for farther off as well: with a lens that is dear."""
-PROPOSED_APART, DIFFERENT = 0.04, 0.01
-"""Mean distance between the markings in view of two different proposals, and of two different refined poses, as a
-part of the width of the frame."""
-LEAST_FOUND = 0.7
-"""Least share of the expected lines found, beyond chance. Right poses on real frames find 0.86 and more, wrong ones
-up to 0.9."""
-LEAST_FOUND_IN_PLACE, EXPLAINED_IN_PLACE = 0.6, 0.85
-"""Least share of the expected lines found, beyond chance, and of the paint explained, for a camera that is sought
-where it stood, through its own lens: there are few other poses from which it could be."""
+REFINED = 4
+"""Most proposals that are refined."""
+DIFFERENT = 0.01
+"""Mean distance between the markings in view of two different refined poses, as a part of the width of the frame."""
 LEAST_OVERLAP = 0.2
 """Least intersection over union, as lengths of line, of the network's response and the expected lines. Edges of
 other things lie along a line here and there, and a few lines of a pose are found by them alone. Right poses on
@@ -62,13 +48,11 @@ it and overlaps with the lines by this part of what the best does. It is none wh
 does not explain, and the best explains more: a little if it misses as much, much if it misses less; or where the
 best explains as much and misses so much less: yard lines farther on, one of them where there is none. Nor is it one
 where it explains no more, and its lines lie so many times as far from it."""
-LEAST_SURE, LEAST_SURE_OF_LENS = 0.0025, 0.00125
+LEAST_SURE = 0.0025
 """Largest standard deviation (rms) of the markings in view by the best pose, as a part of the width of the frame,
 through a lens that is known and one that is found. Pose and lens that slide together, one to make up for the other,
 keep every limit of a pose alone. Right ones on rendered views are sure to 0.0012 and better where the lens is found,
 wrong ones to 0.006 and worse."""
-BORDER_POINTS = 20
-"""Points on each side of the frame for which a lens has to have rays."""
 
 Reason = Literal["no-lines", "lines", "few-lines", "implausible", "not-unique", "not-confirmed"]
 
@@ -109,8 +93,9 @@ def relocalise(
     observed = FrameObservations.of(field, channels, response)
     candidates = list[Candidate]()
     looked, through = observed, sought
-    attempts = ATTEMPTS_SOUGHT_LENS if sought.is_lens_sought else ATTEMPTS_KNOWN_LENS
-    farther = LOOKED_FARTHER_SOUGHT_LENS if sought.is_lens_sought else LOOKED_FARTHER_KNOWN_LENS
+    # To search for a lens too is dear.
+    attempts = 2 if sought.is_lens_sought else 3
+    farther = 2 if sought.is_lens_sought else REFINED
     for attempt in range(attempts):
         pulse()
         proposals = [
@@ -137,7 +122,8 @@ def relocalise(
         if sought.other_lenses:
             through = replace(sought, lenses=sought.other_lenses)
         if found.refusal.reason in TOO_LITTLE_PAINT or attempt > 0:
-            looked = observed.strengthened(FAINT)
+            # Then faint paint is paint as well, and so is more that is none.
+            looked = observed.strengthened(1.6)
     return found
 
 
@@ -153,10 +139,10 @@ def _distinct(
     """Return the cameras to be refined: good beside the best, and different from each other."""
     chosen = list[Camera]()
     for one in proposals:
-        if len(chosen) == REFINED or one.agreement < proposals[0].agreement - MUCH_WORSE:
+        if len(chosen) == REFINED or one.agreement < proposals[0].agreement - 0.12:
             break
         camera = Camera(sought.id, one.lens, one.pose, ignored=sought.ignored)
-        if all(_differ(field, markings, other, camera, PROPOSED_APART) for other in chosen):
+        if all(_differ(field, markings, other, camera, 0.04) for other in chosen):
             chosen.append(camera)
     return chosen
 
@@ -170,7 +156,9 @@ def why_not_taken(
         return NotFound("no-lines", "no lines of a field are seen in the frame; is the view free and lit?")
     best, *others = candidates
     seen = best.evidence
-    if seen.agreement < LEAST_FOUND and not _is_likely_in_place(sought, best):
+    # Least share of the expected lines found, beyond chance. Right poses on real frames find 0.86 and more, wrong ones
+    # up to 0.9.
+    if seen.agreement < 0.7 and not _is_likely_in_place(sought, best):
         return NotFound(
             "lines",
             f"no pose explains the lines: at the best one {seen.share:.0%} of the markings in view are seen "
@@ -186,7 +174,7 @@ def why_not_taken(
     if best.residual_px is None or best.sigma is None:
         return NotFound("few-lines", "too few points of lines could be measured; is the view free and lit?")
     width = best.camera.intrinsics.size[0]
-    least_sure_px = width * (LEAST_SURE_OF_LENS if sought.is_lens_sought else LEAST_SURE)
+    least_sure_px = width * (LEAST_SURE / 2 if sought.is_lens_sought else LEAST_SURE)
     if best.shift_px is not None and best.shift_px > least_sure_px:
         off = (
             f"the markings may lie {best.shift_px:.1f} pixels from where the best pose puts them (at most "
@@ -235,12 +223,13 @@ def _is_likely_in_place(sought: SoughtCamera, best: Candidate) -> bool:
     anywhere."""
     if sought.place.position is None or sought.is_lens_sought:
         return False
-    return best.evidence.agreement >= LEAST_FOUND_IN_PLACE and best.explained >= EXPLAINED_IN_PLACE
+    # There are few other poses from which it could be.
+    return best.evidence.agreement >= 0.6 and best.explained >= 0.85
 
 
 def sees_all_of_its_frame(lens: Lens) -> bool:
     """True if each pixel of the frame has a ray: if the model grows as far as to the corners."""
-    return bool(np.isfinite(lens.undistort(lens.border(BORDER_POINTS))).all())
+    return bool(np.isfinite(lens.undistort(lens.border(20))).all())
 
 
 def explains_nearly_as_well(other: Candidate, best: Candidate) -> bool:

@@ -16,19 +16,9 @@ from worker.calibration.relocalisation.hypotheses import rotations_of
 from worker.calibration.relocalisation.line_view import LineView
 from worker.calibration.relocalisation.sought import SoughtLens
 
-STEP_DEG = 2.0
-STEEPEST_DEG = 78.0
-ROLL_REACH = 8 / 3
-"""Largest roll that is tried, in standard deviations of the expected roll."""
-COARSE, FINE = 0.02, 0.006
-"""Angle, rad, between a direction and the plane of a segment at which its vote is 1/e: on the grid, and after."""
+FINE = 0.006
+"""Angle, rad, between a direction and the plane of a segment at which its vote is 1/e."""
 APART_DEG = 4.0
-ROLLED = 0.02
-"""Votes that a roll of one standard deviation costs."""
-ROUNDS, OFFSPRING, SPREAD_DEG, NARROWER = 7, 48, 1.4, 0.6
-FOCAL_SPREAD, FOCAL_OFFSPRING = 0.06, 5
-FOCAL_RATIO = 1.19
-"""Ratio of two focal lengths that are tried one after the other."""
 QUARTER = np.pi / 2
 
 
@@ -51,7 +41,8 @@ def focal_lengths(view: LineView, sought: SoughtLens) -> Array:
     """Return the focal lengths to be tried, view pixels."""
     if sought.is_known:
         return np.array([view.focal_px])
-    count = max(3, round(np.log(sought.longest_px / sought.shortest_px) / np.log(FOCAL_RATIO)) + 1)
+    # Ratio of two focal lengths that are tried one after the other.
+    count = max(3, round(np.log(sought.longest_px / sought.shortest_px) / np.log(1.19)) + 1)
     return np.geomspace(sought.shortest_px, sought.longest_px, count) / view.frame_px
 
 
@@ -73,12 +64,12 @@ def vote(view: LineView, focal_px: Array, most: int, rng: np.random.Generator) -
 
 def _peaks(view: LineView, focal: float, count: int) -> list[Direction]:
     """Return the peaks of the votes on a grid."""
-    step, most_roll = np.radians(STEP_DEG), ROLL_REACH * view.roll_sigma
-    axes = np.arange(0, np.pi / 2, step), np.arange(step / 2, np.radians(STEEPEST_DEG), step)
+    step, most_roll = np.radians(2.0), 8 / 3 * view.roll_sigma
+    axes = np.arange(0, np.pi / 2, step), np.arange(step / 2, np.radians(78.0), step)
     level = np.stack(np.meshgrid(*axes, [0.0], indexing="ij"), axis=-1).reshape(-1, 3)
     # Roll by roll: all of the grid at once takes hundreds of megabytes.
     rolled = [level + [0.0, 0.0, roll] for roll in np.arange(-most_roll, most_roll + step / 2, step)]
-    votes = np.concatenate([_votes(view, directions, focal, COARSE) for directions in rolled])
+    votes = np.concatenate([_votes(view, directions, focal, 0.02) for directions in rolled])
     directions = np.concatenate(rolled)
     peaks = list[Direction]()
     for n in np.argsort(-votes)[: 60 * count]:
@@ -95,13 +86,13 @@ def _climbed(view: LineView, start: Direction, frees_focal: bool, rng: np.random
     best = Direction(
         start.pan_tilt_roll, start.focal_px, float(_votes(view, start.pan_tilt_roll[None], start.focal_px, FINE)[0])
     )
-    for number in range(ROUNDS):
-        narrower = NARROWER**number
-        spread = np.radians(SPREAD_DEG) * narrower
-        offspring = best.pan_tilt_roll + spread * rng.normal(size=(OFFSPRING, 3))
+    for number in range(7):
+        narrower = 0.6**number
+        spread = np.radians(1.4) * narrower
+        offspring = best.pan_tilt_roll + spread * rng.normal(size=(48, 3))
         tried = [best.focal_px]
         if frees_focal:
-            tried += list(best.focal_px * np.exp(FOCAL_SPREAD * narrower * rng.normal(size=FOCAL_OFFSPRING)))
+            tried += list(best.focal_px * np.exp(0.06 * narrower * rng.normal(size=5)))
         for focal in tried:
             votes = _votes(view, offspring, focal, FINE)
             if votes.max() > best.votes:
@@ -116,7 +107,8 @@ def _votes(view: LineView, pan_tilt_roll: Array, focal: float, tolerance: float)
     normals = view.normals(focal).astype(np.float32)
     lengths = view.lengths
     off = np.minimum(np.abs(rotations[:, :, 0] @ normals.T), np.abs(rotations[:, :, 1] @ normals.T))
-    rolled = ROLLED * (pan_tilt_roll[:, 2] / view.roll_sigma) ** 2
+    # Votes that a roll of one standard deviation costs.
+    rolled = 0.02 * (pan_tilt_roll[:, 2] / view.roll_sigma) ** 2
     return np.asarray(np.exp(-((off / tolerance) ** 2)) @ lengths / lengths.sum() - rolled)
 
 

@@ -19,25 +19,8 @@ from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.ground_view import sampled
 from worker.calibration.robust import USUAL
 
-CELLS_A_SIDE, BESIDE_M = 400, 3.0
-"""Number of places along the longer side of the field that are compared, and margin beside it."""
-OFF_PAINT_M, OFF_PAINT_CELLS, OFF_PAINT_PX = 0.4, 2.5, 3.0
-"""Least distance of a place from the middle of a line, which looks alike from each pose that explains the lines."""
-LEAST_PX = 0.5
-"""Least distance of neighbouring places in the frame: nearer ones are too far away."""
-FINE_CELLS, COARSE_CELLS = 1.0, 3.0
-"""Standard deviations of the blurs that bound the texture: finer detail is noise, and misplaced from far away;
-coarser is light and colour."""
-DARKEST = 4.0
-"""Least value: logarithms of darker ones are noise."""
-OUTLYING = 3.0
-"""Deviations at which values are cut: beyond there are players, who stand off the ground."""
-LEAST_PLACES = 4000
-"""Fewest places that both cameras see for a comparison."""
-LEAST_ALIKE, CLEARLY_MORE_ALIKE = 0.35, 0.2
-"""Least correlation of the right pose, and least margin over each of the others. Of rendered pairs of cameras
-anywhere around a field half the right ones reach 0.5, others stay below 0.2 but where stripes are mown; of real
-cameras on one mount right ones reach 0.44 and 0.72, and no others 0.1."""
+BESIDE_M = 3.0
+"""Margin beside the field that is compared."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +36,9 @@ class GroundComparison:
         """Number of the pose that is right, None where that is not clear."""
         best = int(self.correlations.argmax())
         next_best = float(np.delete(self.correlations, best).max(initial=0.0))
-        return best if self.correlations[best] >= max(LEAST_ALIKE, next_best + CLEARLY_MORE_ALIKE) else None
+        # Of rendered pairs of cameras anywhere around a field half the right poses reach 0.5, others stay below 0.2 but
+        # where stripes are mown; of real cameras on one mount right ones reach 0.44 and 0.72, and no others 0.1.
+        return best if self.correlations[best] >= max(0.35, next_best + 0.2) else None
 
     def in_words(self, right: int) -> str:
         """Return the correlations that speak for the pose of number `right`, as a clause of a sentence."""
@@ -80,14 +65,15 @@ class SharedGround:
         """Return the ground of a field and a little around it."""
         lines = pitch.line_points().position[:, :2]
         low, high = lines.min(axis=0) - BESIDE_M, lines.max(axis=0) + BESIDE_M
-        step_m = float((high - low).max()) / CELLS_A_SIDE
+        step_m = float((high - low).max()) / 400
         x, y = (np.arange(low[axis], high[axis], step_m) for axis in (0, 1))
         places = np.stack(np.meshgrid(x, y), axis=-1)
         bare = np.ones((len(y), len(x)), np.uint8)
         column, row = np.rint((lines - low) / step_m).astype(int).T
         bare[row, column] = 0
         from_paint = cv2.distanceTransform(bare, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
-        near = from_paint < max(OFF_PAINT_M / step_m, OFF_PAINT_CELLS)
+        # Lines look alike from each pose that explains them.
+        near = from_paint < max(0.4 / step_m, 2.5)
         return cls(pitch, places, np.where(near, np.float32(0), from_paint).astype(np.float32), frames)
 
     def compare(self, poses: Sequence[Camera], others: Sequence[Camera]) -> GroundComparison:
@@ -113,9 +99,11 @@ class SharedGround:
         pixels = camera.project(self.pitch.lift(self.places))
         within = inside(pixels, camera.intrinsics.size)
         values, px = sampled(self.frames[camera.id], pixels, within), _least_px(pixels)
-        seen = within & camera.sees(pixels) & (px > LEAST_PX) & (self.from_paint * px > OFF_PAINT_PX)
-        lightness = np.log(np.maximum(values.mean(axis=-1), DARKEST)).astype(np.float32)
-        contrast = _mean(lightness, seen, FINE_CELLS) - _mean(lightness, seen, COARSE_CELLS)
+        seen = within & camera.sees(pixels) & (px > 0.5) & (self.from_paint * px > 3.0)
+        # Least value: logarithms of darker ones are noise.
+        lightness = np.log(np.maximum(values.mean(axis=-1), 4.0)).astype(np.float32)
+        # Finer detail is noise, and misplaced from far away; coarser is light and colour.
+        contrast = _mean(lightness, seen, 1.0) - _mean(lightness, seen, 3.0)
         return _Texture(_without_stripes(contrast, seen), seen)
 
 
@@ -129,7 +117,7 @@ class _Texture:
     def correlation(self, other: _Texture) -> float:
         """Return the correlation of the places that both cameras see, -1..1; 0 where these are too few."""
         both = self.seen & other.seen
-        if np.count_nonzero(both) < LEAST_PLACES:
+        if np.count_nonzero(both) < 4000:
             return 0.0
         one, another = (_without_outliers(texture.contrast[both]) for texture in (self, other))
         return float(one @ another / np.sqrt(max(float((one @ one) * (another @ another)), 1e-9)))
@@ -165,8 +153,8 @@ def _without_stripes(values: NDArray[np.float32], counted: NDArray[np.bool_]) ->
 
 
 def _without_outliers(values: NDArray[np.float32]) -> Array:
-    """Return the values around 0, none of them beyond `OUTLYING` deviations."""
+    """Return the values around 0, none of them beyond three deviations."""
     around = values - np.median(values)
-    most = OUTLYING * float(np.median(np.abs(around))) / USUAL
+    most = 3.0 * float(np.median(np.abs(around))) / USUAL
     clipped = np.clip(around, -most, most)
     return np.asarray(clipped - clipped.mean(), float)

@@ -15,16 +15,10 @@ from worker.calibration.geometry.lens import Intrinsics, Lens
 
 Side = Literal["near", "far", "left", "right"]
 """Sides of the field: near is y < 0, far y > 0, left x < 0, right x > 0."""
-SHORTEST_FOCAL, LONGEST_FOCAL = 0.4, 4.5
-"""Focal lengths of lenses of which nothing is known, in widths of the frame: views of 103° to 13°."""
 BENDS, OTHER_BENDS = (0.0, -0.07), (-0.035, -0.14)
 """Distortions of such lenses: the radial term k1 at half the width of the frame, which tells lenses of one bend
 apart from those of another whatever their focal length; the others are tried where these find nothing. An action
 camera has -0.2, and from there a pose is caught that was proposed with -0.14."""
-WELL_KNOWN = 0.02
-"""Relative sigma of a focal length that needs no search."""
-SIGMAS = 2.0
-"""Standard deviations around a given focal length that are searched."""
 
 
 @dataclass(frozen=True)
@@ -46,10 +40,11 @@ class SoughtLens:
 
     @classmethod
     def around(cls, lens: Lens, uncertain: float) -> SoughtLens:
-        """Return a lens with this relative sigma of its focal length: `WELL_KNOWN` and less is known."""
-        if uncertain <= WELL_KNOWN:
+        """Return a lens with this relative sigma of its focal length, which a small one makes known."""
+        # Relative sigma of a focal length that needs no search.
+        if uncertain <= 0.02:
             return cls.known(lens)
-        reach = 1 + SIGMAS * uncertain
+        reach = 1 + 2.0 * uncertain
         return cls(lens, lens.focal_length_px / reach, lens.focal_length_px * reach)
 
     @property
@@ -118,7 +113,8 @@ def unknown_lenses(size: tuple[int, int], bends: Sequence[float] = BENDS) -> lis
     """Return lenses of each bend and every usual focal length for a frame (width, height) of unknown lens."""
     width = size[0]
     lenses = [_bent(size, float(width), bend) for bend in bends]
-    return [SoughtLens(lens, SHORTEST_FOCAL * width, LONGEST_FOCAL * width, is_bend_known=False) for lens in lenses]
+    # Views of 103° to 13°.
+    return [SoughtLens(lens, 0.4 * width, 4.5 * width, is_bend_known=False) for lens in lenses]
 
 
 def lenses_of_view(

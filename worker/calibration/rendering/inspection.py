@@ -14,10 +14,7 @@ from worker.calibration.rendering.markings import NEW_COLOUR
 from worker.calibration.rendering.overlays import draw_line, legend, outline
 
 WIDTH_PX = 1600
-LEGEND_PX = 180
-ARROW_PX = 12.0
-"""Length of the arrow for a residual of the median size."""
-PAPER, GRID = (250, 250, 250), (205, 205, 205)
+PAPER = (250, 250, 250)
 COVERED, BARE = (205, 235, 205), (215, 215, 250)
 CORNER, ARROW, CENTRE = (150, 90, 30), (40, 40, 220), (200, 0, 200)
 CLICKED, MISLABELLED, EXPECTED = (60, 200, 60), (40, 40, 240), (0, 200, 255)
@@ -29,15 +26,16 @@ def coverage_picture(found: LensCalibration) -> Frame:
     scale = WIDTH_PX / width
     size = (WIDTH_PX, round(height * scale))
     # Below the picture there is room for the legend, which would hide corners.
-    picture = np.full((size[1] + LEGEND_PX, size[0], 3), PAPER, np.uint8)
+    picture = np.full((size[1] + 180, size[0], 3), PAPER, np.uint8)
     rows, columns = found.coverage.cells.shape
     for row, column in np.ndindex(rows, columns):
         box = [round(column * size[0] / columns), round(row * size[1] / rows)]
         end = [round((column + 1) * size[0] / columns), round((row + 1) * size[1] / rows)]
         cv2.rectangle(picture, box, end, COVERED if found.coverage.cells[row, column] else BARE, cv2.FILLED)
-        cv2.rectangle(picture, box, end, GRID, 1)
+        cv2.rectangle(picture, box, end, (205, 205, 205), 1)
     lengths = np.linalg.norm(found.off, axis=1)
-    enlarged = ARROW_PX / max(float(np.median(lengths)) * scale, 1e-9)
+    # Length of the arrow for a residual of the median size.
+    enlarged = 12.0 / max(float(np.median(lengths)) * scale, 1e-9)
     ends = found.corners + enlarged * found.off
     for corner, end in zip((found.corners + 0.5) * scale - 0.5, (ends + 0.5) * scale - 0.5, strict=True):
         cv2.circle(picture, _fixed(corner), 3 * 16, CORNER, cv2.FILLED, cv2.LINE_AA, shift=4)

@@ -17,9 +17,6 @@ ELSEWHERE_COLOUR = (255, 80, 255)
 MISSING_COLOUR = (240, 240, 60)
 WELL_FOUND = 0.7
 WRONG = ((f"found less than {WELL_FOUND:.0%}", MISSING_COLOUR), ("painted elsewhere", ELSEWHERE_COLOUR))
-MOST_LISTED = 12
-TEXT_PX = 0.009
-"""Height of the letters, in widths of the picture."""
 
 
 def colour_of(seen: MarkingReport) -> tuple[int, int, int]:
@@ -37,10 +34,11 @@ def colours_of(pitch: Field, seen: Sequence[MarkingReport]) -> list[tuple[int, i
 
 def list_wrong(picture: Frame, pitch: Field, camera: Camera, seen: Sequence[MarkingReport]) -> None:
     """Number the markings that are elsewhere or hardly found, the worst first, and list what is wrong in a corner."""
-    wrong = worst(seen)[:MOST_LISTED]
+    wrong = worst(seen)[:12]
     if not wrong:
         return
-    text_px = max(10.0, TEXT_PX * picture.shape[1])
+    # Height of the letters, in widths of the picture.
+    text_px = max(10.0, 0.009 * picture.shape[1])
     scale, thick, pad = text_px / 22, max(1, round(text_px / 16)), round(text_px)
     lines = [f"{number}  {in_words(one)}" for number, one in enumerate(wrong, 1)]
     widest = max(cv2.getTextSize(line, cv2.FONT_HERSHEY_SIMPLEX, scale, thick)[0][0] for line in lines)

@@ -18,7 +18,7 @@ from worker.calibration.search.objective import Objective
 MUTATION_RAD = 0.005
 MUTATION_M = 0.1
 DECAY = 0.95
-PATIENCE, STALLED_BY = 6, 1e-5
+PATIENCE = 6
 """Least decrease of the best loss over `PATIENCE` generations for the search on a level to go on."""
 
 
@@ -122,7 +122,7 @@ class _CameraSearch:
     def has_stalled(self) -> bool:
         """True if the last of the best losses is hardly below that of `PATIENCE` generations before."""
         best = self.best_losses
-        return len(best) > PATIENCE and best[-1 - PATIENCE] - best[-1] < STALLED_BY
+        return len(best) > PATIENCE and best[-1 - PATIENCE] - best[-1] < 1e-5
 
     def _judge(self, genomes: Array) -> None:
         self._evolution.tell(genomes, self._objective.losses(genomes))

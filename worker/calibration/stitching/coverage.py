@@ -14,8 +14,6 @@ NINTHS = (
     ("left", "middle", "right"),
     ("bottom left", "bottom", "bottom right"),
 )
-# A ninth is named if so much of what is unseen lies in it.
-LEAST_OF_UNSEEN = 0.15
 
 
 @dataclass(frozen=True)
@@ -34,5 +32,5 @@ def unseen_part(seen: NDArray[np.bool_]) -> Unseen:
         for name, cell in zip(names, np.array_split(band, 3, axis=1), strict=True)
     }
     total = sum(counts.values())
-    places = [name for name in sorted(counts, key=lambda name: -counts[name]) if counts[name] > LEAST_OF_UNSEEN * total]
+    places = [name for name in sorted(counts, key=lambda name: -counts[name]) if counts[name] > 0.15 * total]
     return Unseen(total / seen.size, places)

@@ -19,15 +19,10 @@ from worker.calibration.stitching.panorama import Contribution, Panorama, every_
 from worker.calibration.stitching.photometry import Light
 from worker.calibration.stitching.views import StitchedView
 
-MOTION_COLUMNS = 320
-"""Approximate number of places across the view at which the motion is computed; the tests hold its error below 0.05
-px for a degree."""
 STILL_BORDER = 0.02
 """Margin of a frame, in its widths, that is not shown, as it comes and goes with the shaking."""
 VIEW_BORDER = 0.025
 """Margin, in widths of a frame, inside which a view ends without holes, also where stored poses are a little off."""
-FILLED = 3
-"""Number of rounds that carry motion to places that the lens model does not cover, for the pixels beside them."""
 
 
 class MovingPanorama:
@@ -39,7 +34,9 @@ class MovingPanorama:
     ) -> None:
         still = panorama(pitch, view, cameras, lights)
         self._still = Panorama(still.size, _within_frames(still.parts, still.seen, STILL_BORDER))
-        self._step = max(1, view.size[0] // MOTION_COLUMNS)
+        # Approximate number of places across the view at which the motion is computed; the tests hold its error below
+        # 0.05 px for a degree.
+        self._step = max(1, view.size[0] // 320)
         self._points = view.behind(pitch, every_nth_pixel(view.size, self._step))
         self._before = [camera.project(self._points) for camera in cameras]
         self._used = [_used(part, self._step) for part in self._still.parts]
@@ -91,7 +88,7 @@ def _used(part: Contribution, step: int) -> NDArray[np.bool_]:
 def _filled(motion: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return motion (h, w, 2) with means of the neighbours where it is NaN, and none farther off."""
     known = np.asarray(np.isfinite(motion).all(axis=-1))
-    for _ in range(FILLED):
+    for _ in range(3):
         if known.all():
             break
         weight = cv2.blur(known.astype(np.float32), (3, 3))

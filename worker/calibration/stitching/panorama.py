@@ -24,10 +24,6 @@ from worker.calibration.stitching.views import StitchedView
 BACKDROP = 38
 # Geometry is computed at every n-th pixel and interpolated; the tests hold it below 0.05 px.
 GEOMETRY_STEP = 4
-# Power of how well a camera sees: a short feather, so that players who stand off the ground do not become ghosts.
-SHARPNESS = 60
-# Below this a camera does not count: less than half a grey level of a white pixel.
-LEAST_WEIGHT = 1 / 512
 
 
 @dataclass(frozen=True)
@@ -124,9 +120,11 @@ def panorama(
 def seam_weights(qualities: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return weights (cameras, H, W) that sum to 1 where any camera sees, from how well each does: the best one,
     feathered."""
-    relative = (qualities / np.maximum(qualities.max(axis=0), 1e-30)) ** SHARPNESS
+    # Power of how well a camera sees: a short feather, so that players who stand off the ground do not become ghosts.
+    relative = (qualities / np.maximum(qualities.max(axis=0), 1e-30)) ** 60
     relative /= np.maximum(relative.sum(axis=0), 1e-30)
-    relative[relative < LEAST_WEIGHT] = 0
+    # Below this a camera does not count: less than half a grey level of a white pixel.
+    relative[relative < (1 / 512)] = 0
     weights: NDArray[np.float32] = relative / np.maximum(relative.sum(axis=0), 1e-30)
     return weights
 

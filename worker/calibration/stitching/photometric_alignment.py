@@ -17,30 +17,19 @@ from worker.calibration.geometry.ground_view import quality, sampled
 from worker.calibration.stitching.photometry import MIDDLE, Light, squared_radius
 from worker.calibration.stitching.views import ViewChoice, chosen_view
 
-# Cameras are compared in a view of this width, smoothed: neither noise nor the edges of what stands off the ground.
-COMPARED_WIDTH, SMOOTHED_PX = 480, 2.0
+# Cameras are compared in a smoothed view: neither noise nor the edges of what stands off the ground.
+SMOOTHED_PX = 2.0
 # Values this dark or bright say nothing about exposure.
 EXPOSED = (16, 240)
-# Fewer places than this that two cameras see say nothing.
-LEAST_PLACES = 100
-# Logarithms. What is left between two cameras at a place, and how many places of a pair are as good as independent.
-NOISE, INDEPENDENT = 0.05, 20
-# Prior sigmas of log gains, contrasts and falloffs around 0: cameras of one rig are alike.
-GAIN_SIGMA, CONTRAST_SIGMA, FALLOFF_SIGMA = 0.3, 0.1, 0.1
-# Beyond this it is no matter of exposure.
-LARGEST_GAIN, LARGEST_CONTRAST, LARGEST_FALLOFF = 1.5, 0.3, 0.4
-ROUNDS = 12
+# A larger gain is no matter of exposure.
+LARGEST_GAIN = 1.5
 UNKNOWNS = 5
-# Residuals beyond so many of their own scales are players, and what else two cameras see differently.
-ROBUST = 2.0
-# Seams are tried at these log ratios of how well two cameras see, over a band as wide, and one is worth moving for a
-# difference that grows with its square: most of both pictures is left where it is seen best.
-SEAMS, BAND = np.linspace(-1.5, 1.5, 31), 0.2
-HOLD = 0.005
+# Log ratios of how well two cameras see at which seams are tried.
+SEAMS = np.linspace(-1.5, 1.5, 31)
 # Log differences above this are all alike: somebody stands there.
 OUTRIGHT = 0.7
-# Prior sigma of reaches around 0, and sigma of the place of a seam.
-REACH_SIGMA, SEAM_SIGMA = 1.0, 0.2
+# Sigma of the place of a seam.
+SEAM_SIGMA = 0.2
 
 
 def evened_out(pitch: Field, cameras: Sequence[Camera], frames: Mapping[str, Frame]) -> dict[str, Light]:
@@ -53,16 +42,17 @@ def evened_out(pitch: Field, cameras: Sequence[Camera], frames: Mapping[str, Fra
     """
     if len(cameras) < 2:
         return {}
-    view = chosen_view(pitch, cameras, ViewChoice(width=COMPARED_WIDTH))
+    view = chosen_view(pitch, cameras, ViewChoice(width=480))
     width, height = view.size
     points = view.behind(pitch, np.stack(np.meshgrid(np.arange(width), np.arange(height)), axis=-1).astype(float))
     seen = [_seen(camera, frames[camera.id], points) for camera in cameras]
+    # Fewer places than this that two cameras see say nothing.
     overlaps = [
         _Overlap.of(i, j, seen)
         for i, j in combinations(range(len(cameras)), 2)
-        if np.count_nonzero(seen[i].valid & seen[j].valid) >= LEAST_PLACES
+        if np.count_nonzero(seen[i].valid & seen[j].valid) >= 100
     ]
-    limits = np.array([*3 * [math.log(LARGEST_GAIN)], LARGEST_CONTRAST, LARGEST_FALLOFF])
+    limits = np.array([*3 * [math.log(LARGEST_GAIN)], 0.3, 0.4])
     numbers = np.clip(_solved(overlaps, len(cameras)), -limits, limits)
     reaches = _reaches(overlaps, seen, numbers)
     overlapping = sorted({n for overlap in overlaps for n in overlap.cameras})
@@ -135,16 +125,19 @@ class _Overlap:
 
 def _solved(overlaps: Sequence[_Overlap], count: int) -> Array:
     """Return log gains of blue, green and red, contrast and falloff of each camera, (count, 5)."""
-    sigma = np.tile([*3 * [GAIN_SIGMA], CONTRAST_SIGMA, FALLOFF_SIGMA], count)
+    # Cameras of one rig are alike.
+    sigma = np.tile([*3 * [0.3], 0.1, 0.1], count)
     solution: Array = np.zeros(UNKNOWNS * count)
-    for _ in range(ROUNDS):
+    for _ in range(12):
         normal, right = np.diag(1 / np.square(sigma)).astype(float), np.zeros(UNKNOWNS * count)
         for overlap in overlaps:
             columns, design = overlap.columns, overlap.design
             residual = overlap.difference - design @ solution[columns]
             scale = max(1.4826 * float(np.median(np.abs(residual))), 1e-3)
-            weight = 1 / np.maximum(1, np.abs(residual) / (ROBUST * scale)) ** 2
-            weight *= INDEPENDENT / NOISE**2 / weight.sum()
+            # Residuals beyond so many of their own scales are players, and what else two cameras see differently.
+            weight = 1 / np.maximum(1, np.abs(residual) / (2.0 * scale)) ** 2
+            # So many places of a pair are as good as independent.
+            weight *= 20 / 0.05**2 / weight.sum()
             normal[np.ix_(columns, columns)] += design.T @ (weight[:, None] * design)
             right[columns] += design.T @ (weight * overlap.difference)
         solution = np.asarray(np.linalg.solve(normal, right), float)
@@ -153,7 +146,7 @@ def _solved(overlaps: Sequence[_Overlap], count: int) -> Array:
 
 def _reaches(overlaps: Sequence[_Overlap], seen: Sequence[_Seen], numbers: Array) -> Array:
     """Return the reach of each camera that brings the seam of each pair to where the two differ least."""
-    normal, right = np.eye(len(seen)) / REACH_SIGMA**2, np.zeros(len(seen))
+    normal, right = np.eye(len(seen)), np.zeros(len(seen))
     for overlap in overlaps:
         i, j = overlap.cameras
         sign = np.zeros(len(seen))
@@ -170,7 +163,9 @@ def _best_seam(first: _Seen, second: _Seen, by_first: Array, by_second: Array) -
     apart = np.abs(first.evened(by_first) - second.evened(by_second)).mean(axis=-1)[both]
     costs = []
     for seam in SEAMS:
-        along = np.abs(ratio - seam) < BAND
+        along = np.abs(ratio - seam) < 0.2
         differing = np.minimum(apart[along], OUTRIGHT).mean() if along.any() else OUTRIGHT
-        costs.append(differing + HOLD * seam**2)
+        # A seam is moved for a difference that grows with its square: most of both pictures is left where it is seen
+        # best.
+        costs.append(differing + 0.005 * seam**2)
     return float(SEAMS[np.argmin(costs)])

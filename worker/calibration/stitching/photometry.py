@@ -11,8 +11,6 @@ from worker.calibration.geometry.camera import Array
 
 # The grey level that a contrast leaves as it is.
 MIDDLE = 100.0
-# Weight of a new estimate beside the one kept.
-NEW_SHARE = 0.25
 
 
 @dataclass(frozen=True)
@@ -47,7 +45,7 @@ class Light:
         if before is None:
             return self
         old, new = before.numbers, self.numbers
-        return Light.of(old + NEW_SHARE * (new - old))
+        return Light.of(old + 0.25 * (new - old))
 
     @property
     def numbers(self) -> Array:

@@ -16,23 +16,15 @@ from worker.calibration.geometry.rotation import rotation_matrices, rotation_vec
 Projection = Literal["pannini", "cylinder", "rectilinear", "birds-eye"]
 LevelProjection = Literal["pannini", "cylinder", "rectilinear"]
 
-# A view stands back where the cameras see the pitch further to the side than this, then until it has this.
-TOO_WIDE_DEG, STANDING_BACK_DEG = 80.0, 60.0
-# A view shows this much around the visible pitch, in widths and heights of it in the picture.
-AROUND_SIDES, AROUND_ABOVE, AROUND_BELOW = 0.03, 0.8, 0.15
+# A view shows this much to the sides of the visible field, in widths of it in the picture.
+AROUND_SIDES = 0.03
 # Margin around the field from above, in metres.
 AROUND_PITCH_M = 3.0
-# Least and largest height of a view in widths.
-HEIGHT_TO_WIDTH = 0.15, 1.0
 # Widest field of view of each projection; beyond it the picture is mostly its own corners.
 WIDEST_DEG: dict[LevelProjection, float] = {"pannini": 270.0, "cylinder": 340.0, "rectilinear": 140.0}
-# Field of view where the view is panned away from all of the field.
-NOTHING_SEEN_DEG = 90.0
 # Steps of a view's place, direction and window (metres, degrees, parts of the focal length): a night's wind, which
 # moves cameras by millimetres, moves the view not at all, and no graphics that somebody laid over it.
 STAND_STEP_M, AXIS_STEP_DEG, WINDOW_STEP = 0.25, 0.5, 0.02
-# "Infinity": far beyond any parallax between cameras, near enough for float64.
-FAR_M = 1e6
 
 
 @dataclass(frozen=True)
@@ -111,7 +103,8 @@ class LevelView:
         # height last found reach it.
         height = np.zeros(directions.shape[:2])
         for _ in range(4):
-            reciprocal = np.maximum(-directions[..., 2] / (start[2] - height), 1 / FAR_M)
+            # "Infinity": far beyond any parallax between cameras, near enough for float64.
+            reciprocal = np.maximum(-directions[..., 2] / (start[2] - height), 1 / 1e6)
             points = start + directions / reciprocal[..., None]
             height = pitch.height(points[..., :2])
         return points
@@ -207,7 +200,7 @@ def _level_view(
     focal = choice.width / (right - left)
     if choice.height is None:
         # Poses that are far off make slivers; those are the ones somebody has to look at.
-        least, largest = np.array(HEIGHT_TO_WIDTH) * choice.width
+        least, largest = np.array([0.15, 1.0]) * choice.width
         height = _even(np.clip(focal * (bottom - top), least, largest))
     else:
         height = choice.height
@@ -254,8 +247,9 @@ def _stand(cameras: Sequence[Camera], seen: Sequence[Array]) -> Pose:
     along = offset @ ahead
     # To the side, or down for cameras that hang above the pitch.
     aside = np.maximum(np.abs(offset @ [ahead[1], -ahead[0]]), position[2] - points[:, 2])
-    if np.any(aside > np.tan(np.radians(TOO_WIDE_DEG)) * along):
-        back = np.max(aside / np.tan(np.radians(STANDING_BACK_DEG)) - along)
+    # It stands back where they see the field farther than 80° to the side, until it has 60°.
+    if np.any(aside > np.tan(np.radians(80.0)) * along):
+        back = np.max(aside / np.tan(np.radians(60.0)) - along)
         steepness = [
             camera.pose.position[2] / np.median(np.linalg.norm(own[:, :2] - camera.pose.position[:2], axis=1))
             for camera, own in zip(cameras, seen, strict=True)
@@ -276,12 +270,12 @@ def _window(
     widest = _borders(aim, WIDEST_DEG[aim.projection])
     within = (on_plane[:, 0] > widest[0]) & (on_plane[:, 0] < widest[1])
     if not within.any():
-        return *_borders(aim, NOTHING_SEEN_DEG), -1.0, 1.0
+        return *_borders(aim, 90.0), -1.0, 1.0
     on_plane = on_plane[within]
     (left, top), (right, bottom) = on_plane.min(axis=0), on_plane.max(axis=0)
     width, height = right - left, bottom - top
     left, right = left - AROUND_SIDES * width, right + AROUND_SIDES * width
-    top, bottom = top - AROUND_ABOVE * height, bottom + AROUND_BELOW * height
+    top, bottom = top - 0.8 * height, bottom + 0.15 * height
 
     step = (right - left) / 240
     columns, rows = np.arange(left, right, step), np.arange(top, bottom, step)

@@ -22,12 +22,7 @@ from worker.calibration.tracking.motion_filter import GATE, FilterStep, State, s
 FIRST_SEARCH_PX = (28.0, *REFINEMENT_SEARCH_PX)
 """Half width of the first frame's search round by round, in pixels of a 4K frame: it may be taken at the end of a
 swing."""
-KNOWN_PX = 4.0
-"""Standard deviation of lines in later frames, in pixels of a 4K frame, from which they are searched for step by
-step."""
 
-LEAST_AGREEMENT = 0.3
-"""Least share of lines, beyond chance, that the first frame has to show where the cameras are found."""
 
 How = Literal["measured", "coasted", "refused"]
 
@@ -192,7 +187,7 @@ class _Track:
     def _sighted(self, picture: PixelReader, expected: State) -> Sighting | None:
         """Observe the lines, from where the camera is expected; step by step where that is hardly known."""
         camera = moved(self.lines.reference, expected.change)
-        if self._off_px(expected) > KNOWN_PX:
+        if self._off_px(expected) > 4.0:
             return self.lines.searched(picture, camera)
         return self.lines.sighted(picture, camera)
 
@@ -209,7 +204,8 @@ def _references(pitch: Field, cameras: Sequence[Camera], first: Mapping[str, Fra
     observations = Observations([Channels([first[camera.id]]) for camera in cameras], responses)
     found = []
     for one in refine(pitch, cameras, observations, 0.5, searches_px=FIRST_SEARCH_PX).each:
-        if one.covariance is None or one.evidence.agreement < LEAST_AGREEMENT:
+        # Least share of lines, beyond chance, that the first frame has to show where the cameras are found.
+        if one.covariance is None or one.evidence.agreement < 0.3:
             raise _not_seen(one.camera)
         found.append((one.camera, one.covariance))
     return found

@@ -24,38 +24,17 @@ from worker.calibration.tracking.learned_offsets import LearnedOffsets
 from worker.calibration.tracking.motion_filter import PoseObservation
 from worker.calibration.tracking.telling_pieces import most_telling
 
-APART_PX = 12.0
-"""Approximate distance between pieces of line, in pixels of a 4K frame."""
-COARSELY = 3
-"""Step of the pieces that are looked for at first where a camera is hardly known."""
-FEW, LEARNING, ALL_EVERY = 200, 25, 50
-"""Number of pieces that are looked at after `LEARNING` looks at all of them; all again in every `ALL_EVERY`-th look."""
-OFTEN = 0.5
-"""Share of the most sights of any piece below which a piece is not among the few."""
-SEARCH_PX, NEAR_PX, LOST_SEARCH_PX = 8.0, 3.0, (28.0, 14.0)
-"""Half widths of the search for pieces, in pixels of a 4K frame: at first, again from where the camera is then
-found, and before that, round by round, where it is hardly known."""
-NEARBY_PX = 2.0
-"""Median distance of lines from where they were expected, in pixels of a 4K frame, up to which they are measured
-once."""
-FEWEST_PIECES, FEWEST_SHARE = 20, 0.3
-"""Fewest pieces of line, and least share of those that are usually found, for a frame to count."""
-SHOWN, AT_REFERENCE_PX = 0.5, 3.0
-"""Share of a marking that has to be found near the reference for it to be followed, and the search for it in pixels
-of a 4K frame."""
-NOVELTY = 0.05
-"""Weight of a new frame in the usual share of pieces found, and in the usual misfit."""
-MOST_MISFIT, MOST_MISFIT_ANEW, LEAST_MISFIT = 3.0, 2.0, 0.3
-"""Limits of the median residual: in multiples of the usual one, the same for a camera that was refused in the look
-before, and the least usual one in expected errors. Five times it is after a zoom by 0.5 %; twice in noise of 25 grey
-levels, in JPEGs of quality 8 and out of focus by two pixels, all of a sudden; players and shadows do not reach a
-median."""
-BESIDE_PX = 1.0
-"""Standard deviation of a piece of line's lasting offset from its place, in pixels of a 4K frame."""
+FEW, LEARNING = 200, 25
+"""Number of pieces that are looked at after `LEARNING` looks at all of them."""
+SEARCH_PX, NEAR_PX = 8.0, 3.0
+"""Half widths of the search for pieces, in pixels of a 4K frame: at first, and again from where the camera is then
+found."""
+FEWEST_PIECES = 20
+"""Fewest pieces of line for a frame to count."""
+AT_REFERENCE_PX = 3.0
+"""Half width of the search for markings near the reference, in pixels of a 4K frame."""
 NOISE_PX = 0.1
 """Least error of the measurement of a piece, in pixels of the frame."""
-PICTURE_PX = 0.04
-"""Error that all pieces of a frame have in common: what a codec and the grid of pixels do to every line alike."""
 PRIOR = np.diag(np.repeat([0.03, 1.0], 3) ** -2.0)
 """Information (6, 6) without any line, standard deviations of 0.03 rad and a metre: it holds the directions of which
 lines say nothing; much wider than any motion that is followed."""
@@ -115,7 +94,8 @@ class TrackedLines:
         self.reference = reference
         self._scale = reference.intrinsics.relative_size
         lines, channels = pitch.line_points(), Channels([first])
-        expected = VisibleLines.from_camera(lines, reference).thinned(APART_PX * self._scale).index
+        # Approximate distance between pieces of line, in pixels of a 4K frame.
+        expected = VisibleLines.from_camera(lines, reference).thinned(12.0 * self._scale).index
         visible = VisibleLines.from_camera(lines[expected], reference)
         self._contrasts = known_contrasts(visible, channels, AT_REFERENCE_PX * self._scale, self._scale)
         chosen = self._shown(lines, expected, channels)
@@ -125,7 +105,8 @@ class TrackedLines:
         self._looks = 0
         self._patch = chosen // CLUSTER_POINTS
         self._usual = self._usual_misfit = 0.0
-        self._beside = LearnedOffsets(len(chosen), BESIDE_PX * self._scale, NOISE_PX)
+        # Standard deviation of a piece of line's lasting offset from its place, in pixels of a 4K frame.
+        self._beside = LearnedOffsets(len(chosen), self._scale, NOISE_PX)
 
     def _shown(self, lines: LinePoints, expected: NDArray[np.intp], channels: Channels) -> NDArray[np.intp]:
         """Return the line points on markings of which the first frame shows enough."""
@@ -137,7 +118,7 @@ class TrackedLines:
             np.bincount(marking[found], minlength=len(lines)),
             np.bincount(marking, minlength=len(lines)),
         )
-        return expected[(known >= SHOWN * looked_for)[marking]]
+        return expected[(known >= 0.5 * looked_for)[marking]]
 
     def sighted(self, picture: PixelReader, expected: Camera) -> Sighting | None:
         """Measure lines near where the camera `expected` puts them; None where too few are found.
@@ -150,8 +131,8 @@ class TrackedLines:
     def searched(self, picture: PixelReader, expected: Camera) -> Sighting | None:
         """Measure lines in ever narrower searches, for a camera whose pose is hardly known; None as `sighted`."""
         pieces = self._next_pieces()
-        for search in LOST_SEARCH_PX:
-            sighting = self._within(search, self._read(picture, expected, pieces[::COARSELY], search), expected)
+        for search in (28.0, 14.0):
+            sighting = self._within(search, self._read(picture, expected, pieces[::3], search), expected)
             if sighting is None:
                 return None
             expected = moved(self.reference, sighting.observed.change)
@@ -163,13 +144,17 @@ class TrackedLines:
         With another lens than the reference's, or another marking taken for one, each pose leaves some of them off.
         `anew`: True if the camera was refused in the look before; then it has to be nearer.
         """
-        most = MOST_MISFIT_ANEW if anew else MOST_MISFIT
-        return sighting.misfit <= most * max(LEAST_MISFIT, self._usual_misfit)
+        # Limits of the median residual: in multiples of the usual one, the same for a camera that was refused in the
+        # look before, and the least usual one in expected errors. Five times it is after a zoom by 0.5 %; twice in
+        # noise of 25 grey levels, in JPEGs of quality 8 and out of focus by two pixels, all of a sudden; players and
+        # shadows do not reach a median.
+        most = 2.0 if anew else 3.0
+        return sighting.misfit <= most * max(0.3, self._usual_misfit)
 
     def _next_pieces(self) -> NDArray[np.intp]:
         """Return the pieces for the next picture: all, or a few that were chosen once all had been learned."""
         self._looks += 1
-        if self._looks <= LEARNING or self._looks % ALL_EVERY == 0:
+        if self._looks <= LEARNING or self._looks % 50 == 0:
             self._few = None
             return self._all
         if self._few is None:
@@ -185,7 +170,7 @@ class TrackedLines:
         sighting = self._within(SEARCH_PX, read, expected)
         if sighting is None:
             return None
-        if np.median(np.abs(sighting.seen.offset)) < NEARBY_PX * self._scale:
+        if np.median(np.abs(sighting.seen.offset)) < 2.0 * self._scale:
             return sighting
         found = moved(self.reference, sighting.observed.change)
         if not read.profiles.cover(found, read.lines, NEAR_PX * self._scale):
@@ -206,14 +191,14 @@ class TrackedLines:
         jacobian = np.einsum("mij,mi->mj", pixel_jacobian(expected, points), found.normal)
         good = np.isfinite(offset) & np.isfinite(jacobian).all(axis=1)
         share = good.sum() / len(read.pieces)
-        if good.sum() < FEWEST_PIECES or share < FEWEST_SHARE * self._usual:
+        if good.sum() < FEWEST_PIECES or share < 0.3 * self._usual:
             return None
         seen = LineObservations(expected, read.pieces[found.index[good]], offset[good], jacobian[good], share)
         return self.explained(seen)
 
     def _telling(self) -> NDArray[np.intp]:
         """Return the few pieces that are looked at: of those that are seen at least half as often as others."""
-        often = np.flatnonzero(self._beside.are_seen_as_often(OFTEN))
+        often = np.flatnonzero(self._beside.are_seen_as_often(0.5))
         seen = VisibleLines.from_camera(self._pieces[often], self.reference)
         jacobian = np.einsum("mij,mi->mj", pixel_jacobian(self.reference, seen.points.position), seen.normal) / NOISE_PX
         usable = np.flatnonzero(np.isfinite(jacobian).all(axis=1))
@@ -234,7 +219,8 @@ class TrackedLines:
         spread = self._spread(seen, rows * (weight * residual)[:, None])
         together = float(np.trace(np.linalg.solve(information + PRIOR, spread))) / POSE_NUMBERS
         known = information / max(1.0, together)
-        of_picture = np.diag(np.repeat([PICTURE_PX / seen.expected.intrinsics.focal_length_px, 0.0], 3) ** 2)
+        # Error that all pieces of a frame have in common: what a codec and the grid of pixels do to every line alike.
+        of_picture = np.diag(np.repeat([0.04 / seen.expected.intrinsics.focal_length_px, 0.0], 3) ** 2)
         observed = PoseObservation(
             change_between(self.reference, moved(seen.expected, change)),
             np.asarray(np.linalg.solve(np.eye(POSE_NUMBERS) + known @ of_picture, known), float),
@@ -256,7 +242,8 @@ class TrackedLines:
         residual = seen.offset - seen.jacobian @ change_between(seen.expected, now)
         counted = tukey_weights((residual - self._beside.mean[seen.piece]) / self._sigma(seen)) > 0
         which = seen.piece[counted]
-        novelty = NOVELTY if self._usual else 1.0
+        # Weight of a new frame in the usual share of pieces found, and in the usual misfit.
+        novelty = 0.05 if self._usual else 1.0
         self._usual += (seen.share - self._usual) * novelty
         self._usual_misfit += (sighting.misfit - self._usual_misfit) * novelty
         self._beside.learn(which, residual[counted])

@@ -13,10 +13,6 @@ import numpy as np
 from worker.calibration.geometry.camera import Array
 from worker.calibration.geometry.derivatives import POSE_NUMBERS
 
-TURNING_RAD_S2, SHIFTING_M_S2 = np.radians(15.0), 1.0
-"""Accelerations, one standard deviation: a mast in wind, 0.3 degrees at 0.5 Hz and a tenth of that at 3 Hz and more."""
-FIRST_RAD_S, FIRST_M_S = np.radians(3.0), 0.2
-"""Standard deviation of a camera's velocity when the clip begins."""
 BACK_RAD, BACK_M = np.radians(0.3), 0.03
 """Standard deviation of a mast around its reference, to which it comes back when lines are unseen for a second."""
 GATE = 38.3
@@ -45,7 +41,8 @@ class State:
     def at_reference(cls, information: Array) -> State:
         """Return the state of a camera at its reference, known to this information (6, 6), with unknown velocity."""
         place = np.linalg.inv(information + np.diag(np.repeat([BACK_RAD, BACK_M], 3) ** -2.0))
-        speed = np.diag(np.repeat([FIRST_RAD_S, FIRST_M_S], 3) ** 2)
+        # The velocity when the clip begins.
+        speed = np.diag(np.repeat([np.radians(3.0), 0.2], 3) ** 2)
         covariance = np.pad(place, (0, POSE_NUMBERS)) + np.pad(speed, (POSE_NUMBERS, 0))
         return cls(np.zeros(2 * POSE_NUMBERS), np.asarray(covariance, float))
 
@@ -120,6 +117,7 @@ def _onward(seconds: float) -> Array:
 
 def _unforeseen(seconds: float) -> Array:
     """Return the covariance (12, 12) of a state by accelerations that are constant over the time."""
-    variance = np.diag(np.repeat([TURNING_RAD_S2, SHIFTING_M_S2], 3) ** 2)
+    # A mast in wind: 0.3 degrees at 0.5 Hz and a tenth of that at 3 Hz and more.
+    variance = np.diag(np.repeat([np.radians(15.0), 1.0], 3) ** 2)
     shape = np.array([[seconds**4 / 4, seconds**3 / 2], [seconds**3 / 2, seconds**2]])
     return np.kron(shape, variance)
