@@ -35,10 +35,6 @@ PAINT = {
     "orange": (0.1, 0.5, 0.9),
 }
 """Reflectance (blue, green, red) of paint by its name, 0..1."""
-CLEARLY = 0.2
-"""Correlation by which another contrast has to be better than bright in green."""
-OPPOSES = 0.33
-"""Ratio to the strongest contrast from which a contrast that the paint cannot have shows another paint."""
 
 
 class PixelReader(Protocol):

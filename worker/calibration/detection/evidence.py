@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from worker.calibration.detection.contrast import Channels
 from worker.calibration.detection.line_matching import LEAST_ALONG, match_lines
 from worker.calibration.detection.sampling import bilinear
-from worker.calibration.geometry.camera import Array, Camera
+from worker.calibration.geometry.arrays import Array, take_rows
+from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.field import LinePoints
 from worker.calibration.geometry.visibility import VisibleLines
 
@@ -60,8 +61,7 @@ class Evidence:
 
     def for_marking(self, marking: int) -> Evidence:
         """Return the evidence for one marking."""
-        its = self.marking == marking
-        return Evidence(self.index[its], self.marking[its], self.weight[its], self.found[its], self.chance[its])
+        return take_rows(self, self.marking == marking)
 
     def seen(self) -> NDArray[np.intp]:
         """Return the markings that are found clearly more often than chance would: what else fits them is no line."""

@@ -11,9 +11,6 @@ from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.ignored_areas import Ignored
 from worker.calibration.geometry.visibility import VisibleLines
 
-BESIDE_PX = 6.0
-"""Half width of the excluded band around other lines, in pixels of a 4K frame; 2 px at least."""
-
 
 def left_out(pitch: Field, camera: Camera) -> NDArray[np.bool_] | None:
     """Return the mask (H, W) of pixels of a camera's frame that do not count, by its pose; None if all count.
@@ -24,7 +21,8 @@ def left_out(pitch: Field, camera: Camera) -> NDArray[np.bool_] | None:
     others = pitch.other_points()
     if others is None:
         return ignored
-    tolerance = max(BESIDE_PX * camera.intrinsics.relative_size, 2.0)
+    # Half width of the excluded band around other lines, in pixels of a 4K frame; 2 px at least.
+    tolerance = max(6.0 * camera.intrinsics.relative_size, 2.0)
     other, own = (
         line_band(VisibleLines.from_camera(lines, camera), camera.intrinsics.size, tolerance) > 0
         for lines in (others, pitch.line_points())

@@ -15,11 +15,9 @@ from numpy.typing import NDArray
 from fields.shapes import WHITE
 from worker.calibration.detection.contrast import (
     BLUE,
-    CLEARLY,
     CONTRASTS,
     GREEN,
     LUMA,
-    OPPOSES,
     RED,
     Channels,
     PixelReader,
@@ -41,10 +39,8 @@ BESIDE_PX = 4.0
 """Width of grass on each side that belongs to the filter, beyond a third of the line's width."""
 GRID_PX = 16.0
 """Spacing of the fixed points of the picture from which sampling places are counted."""
-TOGETHER_PX = 40.0
-"""Length of line, in pixels of a 4K frame, over which a ridge has to go on to be one."""
 LEAST_ALONG = 0.5
-"""Mean correlation with the expected profile, over `TOGETHER_PX`, from which a ridge is a line by itself."""
+"""Mean correlation with the expected profile, over 40 px of a 4K frame, from which a ridge is a line by itself."""
 
 
 @dataclass(frozen=True)
@@ -169,7 +165,8 @@ def _strongest(strength: Array) -> NDArray[np.intp]:
     """Return the index into `CONTRASTS` of each marking (K,): the usual one unless another one is clearly stronger."""
     favoured = strength.copy()
     usual = np.argmax(strength > -np.inf, axis=0)
-    favoured[usual, np.arange(strength.shape[1])] += CLEARLY
+    # Another contrast has to correlate better by so much.
+    favoured[usual, np.arange(strength.shape[1])] += 0.2
     return np.asarray(np.argmax(favoured, axis=0))
 
 
@@ -185,7 +182,8 @@ def _without_other_paint(looked: Mapping[int, list[Matches]], colour: NDArray[np
         opposed = np.zeros(most.shape, dtype=bool)
         for channel, sign in CONTRASTS:
             impossible = np.array([sign not in possible_signs(str(c), channel) for c in colour[red.which[named]]], bool)
-            opposed |= impossible[:, None] & (sign * contrast[channel] >= OPPOSES * most)
+            # A third of the strongest contrast that the paint cannot have shows another paint.
+            opposed |= impossible[:, None] & (sign * contrast[channel] >= 0.33 * most)
         for channel, of_class, rows in ((GREEN, green, everywhere), (RED, red, named), (BLUE, blue, named)):
             there = of_class.opposed.copy()
             there[rows] = opposed
@@ -260,7 +258,8 @@ def _matches_of(
     offsets = sampling * np.arange(-half_filter, half_filter + 1, dtype=float)
     expected = expected_profiles(pieces.width_px, offsets)
     correlation = sliding_correlation(across, expected)
-    along = _mean_along(correlation, pieces, TOGETHER_PX * relative_size)
+    # Length of line, in pixels of a 4K frame, over which a ridge has to go on to be one.
+    along = _mean_along(correlation, pieces, 40.0 * relative_size)
     shifts = sampling * np.arange(-half_search, half_search + 1, dtype=float)
     free = np.zeros(correlation.shape, dtype=bool)
     return Matches(which, across, expected, offsets, correlation, along, free, shifts, base, sampling)

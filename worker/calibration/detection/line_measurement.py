@@ -24,7 +24,8 @@ from worker.calibration.detection.line_matching import (
 )
 from worker.calibration.detection.line_profile import blurred_point, blurred_step, without_nan
 from worker.calibration.detection.sampling import bilinear
-from worker.calibration.geometry.camera import Array, Camera, Plane
+from worker.calibration.geometry.arrays import Array, Plane, take_rows
+from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.derivatives import lens_jacobian, pixel_jacobian
 from worker.calibration.geometry.field import LinePoints
 from worker.calibration.geometry.visibility import VisibleLines
@@ -34,7 +35,6 @@ CORRELATION = (0.55, 0.65)
 
 Every limit is a ramp: with a step, a measurement beside it would come and go as the pose moves by a hair.
 """
-CENTRE_STEPS = 2
 NOISE_PX = 0.2
 """Standard deviation of one measurement of a perfect line."""
 PAINT_M = 0.006
@@ -42,8 +42,6 @@ PAINT_M = 0.006
 
 SHARED_NOISE = 0.1
 """Part of the variance of `NOISE_PX` that is the same in every frame of a camera that stands still."""
-MISFIT_ALIKE_PX = 10.0
-"""Length of line over which the error of lens and field is the same."""
 
 
 @dataclass(frozen=True)
@@ -93,7 +91,7 @@ class Measurements:
     def noise_px(self) -> Array:
         """Standard deviation (M,) of a measurement when paint and ground are where the model has them.
 
-        The misfit is alike over `MISFIT_ALIKE_PX`: so much of a line counts as one measurement of it. The mean of many
+        The misfit is alike over 10 px: so much of a line counts as one measurement of it. The mean of many
         jobs keeps the part of the noise that all of them share.
         """
         noise = NOISE_PX * np.sqrt(SHARED_NOISE + (1 - SHARED_NOISE) / np.asarray(self.jobs))
@@ -102,21 +100,10 @@ class Measurements:
     @property
     def alike(self) -> Array:
         """Number (M,) of neighbours that share the same misfit, 1 at least."""
-        return np.maximum(MISFIT_ALIKE_PX / self.length_px, 1.0)
+        return np.maximum(10.0 / self.length_px, 1.0)
 
     def __getitem__(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> Measurements:
-        return Measurements(
-            self.index[chosen],
-            self.points[chosen],
-            self.pixel[chosen],
-            self.normal[chosen],
-            self.px_per_metre[chosen],
-            self.px_per_metre_up[chosen],
-            self.length_px[chosen],
-            self.trust[chosen],
-            self.misfit_px,
-            self.jobs if isinstance(self.jobs, float) else self.jobs[chosen],
-        )
+        return take_rows(self, chosen)
 
 
 class LineProfiles:
@@ -291,7 +278,7 @@ def _centre(windows: Array, width_px: Array, offsets: Array, reach_px: float) ->
     sides = np.array([1.0, -1.0])[:, None, None]
     centre, move = np.zeros(len(windows)), np.zeros((len(windows), len(offsets)))
     model = np.empty((len(windows), 4, len(offsets)))
-    for _ in range(1 + CENTRE_STEPS):
+    for _ in range(3):
         edges = offsets - centre[:, None] + sides * width_px[:, None] / 2
         first, second = blurred_step(edges, LENS_BLUR_PX)
         model[:, 0], model[:, 1], model[:, 2], model[:, 3] = 1 - first, first - second, second, move

@@ -28,9 +28,6 @@ from worker.calibration.geometry.camera import Array, Camera
 from worker.calibration.geometry.field import Field
 from worker.calibration.robust import huber_weights
 
-ALIKE_M = 2.5
-"""Length of line over which two views differ alike, by their lenses and by the ground: it counts as one point."""
-
 
 @dataclass(frozen=True)
 class MeasuredLines:
@@ -83,7 +80,8 @@ def _moves(jacobian: Array, apart: Array, sigma: Array, spacing_m: float, at_cen
     the displacement found, and the covariance is that of cameras with the full prior.
     """
     expected = np.linalg.inv(at_centre @ at_centre.T)
-    alike = max(ALIKE_M / spacing_m, 1.0)
+    # Length of line over which two views differ alike, by their lenses and by the ground: it counts as one point.
+    alike = max(2.5 / spacing_m, 1.0)
     moves: Array = np.zeros(jacobian.shape[1])
     # Least part of the expected turns and moves that is expected, step by step (see `registration.FINE_STAGES`).
     for least in (1.0, 0.3, 0.1, 0.01):

@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 from worker.calibration.detection.contrast import Channels
 from worker.calibration.detection.line_measurement import Measurements, measure_lines
 from worker.calibration.geometry.camera import Array, Camera
-from worker.calibration.geometry.derivatives import POSE_NUMBERS, pixel_jacobian
+from worker.calibration.geometry.derivatives import POSE_NUMBERS
 from worker.calibration.geometry.field import Field, LinePoints
 from worker.calibration.geometry.ground import Ground
 from worker.calibration.geometry.parameters import lens_parameters
-from worker.calibration.refinement.estimate import PRIOR_M, PRIOR_RAD
+from worker.calibration.refinement.estimate import POSE_SIGMA
 from worker.calibration.refinement.least_squares import CLUSTER_POINTS, LEAST_NOISE
 from worker.calibration.refinement.uncertainty import RefinedPose
 from worker.calibration.robust import tukey_weights
@@ -234,8 +234,7 @@ class _Offsets:
         """Return the offsets of measurements, None where too few can be used."""
         camera = found.camera
         here = lines.position[measured.index]
-        offset = np.sum((measured.pixel - camera.project(here)) * measured.normal, axis=1)
-        jacobian = np.einsum("mij,mi->mj", pixel_jacobian(camera, here), measured.normal)
+        offset, jacobian = measured.offset(camera, here), -measured.jacobian(camera, here)
         known = np.isfinite(offset) & np.isfinite(jacobian).all(axis=1)
         if known.sum() < FEWEST_MEASURED:
             return None
@@ -328,7 +327,7 @@ def _given_way(
     by_sigma = np.concatenate([jacobian, rises], axis=1) / measured.sigma_px[:, None]
     weighted = by_sigma * weight[:, None]
     information = weighted.T @ by_sigma
-    information[:POSE_NUMBERS, :POSE_NUMBERS] += np.diag([PRIOR_RAD**-2] * 3 + [PRIOR_M**-2] * 3)
+    information[:POSE_NUMBERS, :POSE_NUMBERS] += np.diag(POSE_SIGMA**-2)
     information[POSE_NUMBERS:, POSE_NUMBERS:] += ground.precision / uneven_m**2
     return np.asarray(np.linalg.solve(information, weighted.T)[:POSE_NUMBERS])
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from fields.landmarks import find
 from fields.shapes import WHITE, Arc, Line, Shape
 from fields.template import TURF_M, Template, load
-from worker.calibration.geometry.camera import Array
+from worker.calibration.geometry.arrays import Array, take_rows
 
 FOOTBALL = load("football")
 
@@ -65,16 +65,7 @@ class LinePoints:
         return len(self.position)
 
     def __getitem__(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> LinePoints:
-        return LinePoints(
-            self.position[chosen],
-            self.tangent[chosen],
-            self.normal[chosen],
-            self.width[chosen],
-            self.marking[chosen],
-            self.colour[chosen],
-            self.spacing,
-            self.uneven_m,
-        )
+        return take_rows(self, chosen)
 
 
 @dataclass(frozen=True)

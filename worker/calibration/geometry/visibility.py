@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.geometry.camera import Array, Camera
+from worker.calibration.geometry.arrays import Array, take_rows
+from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.field import LinePoints
 
 STEP_M = 0.05
@@ -67,16 +68,7 @@ class VisibleLines:
         return len(self.points)
 
     def __getitem__(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> VisibleLines:
-        return VisibleLines(
-            self.index[chosen],
-            self.points[chosen],
-            self.pixel[chosen],
-            self.normal[chosen],
-            self.width_px[chosen],
-            self.length_px[chosen],
-            self.px_per_metre[chosen],
-            self.px_per_metre_up[chosen],
-        )
+        return take_rows(self, chosen)
 
     def thinned(self, spacing_px: float) -> VisibleLines:
         """Return about one point every `spacing_px` along the lines; each stands for the length of those dropped."""

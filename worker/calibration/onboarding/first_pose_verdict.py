@@ -17,9 +17,6 @@ from worker.calibration.onboarding.freed_lens import FEWEST_SPARE, LensGain
 from worker.calibration.onboarding.point_fit import PointFit
 
 LARGEST_RMS_PX = 40.0
-LARGEST_SIGMA_PX = 60.0
-"""Largest rms of clicks, and largest sigma of the field in view, in pixels of a 4K frame: what a calibration still
-catches, with room to spare."""
 HEIGHTS_M = (0.5, HIGHEST_M)
 
 
@@ -149,7 +146,7 @@ def _rejection(
             f"a camera at ({x:.1f}, {y:.1f}, {z:.1f}) m explains the points as well as one at "
             f"({position[0]:.1f}, {position[1]:.1f}, {position[2]:.1f}) m: {_what_to_add(best, landmarks)}"
         )
-    if spread_px > LARGEST_SIGMA_PX * relative:
+    if spread_px > 60.0 * relative:
         fixed = (
             f"fix the view to {spread_px:.0f} px only"
             if spread_px < max(best.camera.intrinsics.size)

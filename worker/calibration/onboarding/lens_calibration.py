@@ -32,7 +32,6 @@ from worker.calibration.onboarding.lens_fit import (
 )
 
 FEWEST_PHOTOS = 4
-FOLDS = 5
 ROUNDS = 4
 CELLS = (8, 5)
 """Columns and rows of the picture in which corners are counted."""
@@ -93,7 +92,7 @@ class LensCalibration:
     """Lens with its uncertainty and the evidence for it.
 
     `sigma`: one standard deviation per free parameter, by OpenCV, corners independent; `spread`: the same by leaving
-    out photos (a jackknife over `FOLDS` groups); the `lens` has the larger of both. `corners` and `off` (N, 2): those
+    out photos (a jackknife over five groups); the `lens` has the larger of both. `corners` and `off` (N, 2): those
     used, and projected minus seen, px.
     """
 
@@ -222,7 +221,7 @@ def _as_good(left_out: Array, best: Array) -> bool:
 
 
 def _try(detections: Sequence[BoardDetection], size: tuple[int, int], model: LensModel, rung: Rung) -> _Tried:
-    count = min(FOLDS, len(detections))
+    count = min(5, len(detections))
     left_out = np.empty(len(detections))
     numbers = []
     for fold in range(count):

@@ -21,8 +21,9 @@ from worker.calibration.refinement.least_squares import Rows, normal_equations, 
 from worker.calibration.refinement.unknowns import Unknowns
 from worker.calibration.robust import Weigh
 
-PRIOR_RAD, PRIOR_M = 0.03, 1.0
-"""Standard deviation, per axis, of a camera's pose before any line is measured."""
+POSE_SIGMA: Array = np.repeat([0.03, 1.0], 3)
+"""Standard deviation (6,) of a camera's pose before any line is measured: rad and m per axis. It holds the directions
+of which lines say nothing."""
 TURN_M = 30.0
 """Distance at which a turn counts as the shift of what the camera sees."""
 
@@ -95,7 +96,7 @@ class Estimate:
 
     def weak_prior(self) -> Array:
         """Return the information (6 V, 6 V) on the poses before any line is measured."""
-        return np.diag(([PRIOR_RAD**-2] * 3 + [PRIOR_M**-2] * 3) * len(self.cameras))
+        return np.diag(np.tile(POSE_SIGMA**-2, len(self.cameras)))
 
     def change_from(self, found: Sequence[Camera]) -> Array:
         """Return the change (U,) of all unknowns from where they were `found` by the search or given."""

@@ -29,7 +29,7 @@ from worker.calibration.geometry.parameters import (
     lens_values,
 )
 from worker.calibration.memory.camera_memory import WIND, CameraMemory
-from worker.calibration.refinement.estimate import PRIOR_M, PRIOR_RAD, Estimate
+from worker.calibration.refinement.estimate import POSE_SIGMA, Estimate
 from worker.calibration.refinement.unknowns import Unknowns
 from worker.calibration.refinement.variance_components import Group
 
@@ -53,7 +53,6 @@ times a scale, or only turned."""
 ZOOM_SCALES: Array = np.array([1.0, 4.0, 16.0, 64.0])
 """Possible scales of a focal length's change between views: heat, `HEAT_FOCAL`, or a zoom ring."""
 MOVED = np.array([MOVED_RAD] * 3 + [MOVED_M] * 3)
-FREE = np.array([PRIOR_RAD] * 3 + [PRIOR_M] * 3)
 ONCE: Array = np.ones(1)
 """Only scale of an error whose size is known well enough."""
 
@@ -130,7 +129,7 @@ class _Errors:
         self._cameras, self._solved, self._unknowns = here.cameras, solved, unknowns
         self._owner_of = _owners(memories)
         self._first = POSE_NUMBERS * unknowns.views
-        of_poses = information[: self._first, : self._first] + np.diag(np.tile(FREE**-2, unknowns.views))
+        of_poses = information[: self._first, : self._first] + np.diag(np.tile(POSE_SIGMA**-2, unknowns.views))
         self._response = -np.linalg.solve(of_poses, information[: self._first, self._first :])
         self._places = {
             (parameter.camera, parameter.name): at
@@ -146,7 +145,7 @@ class _Errors:
     def believed(self) -> Priors:
         """Return the priors of all errors added."""
         moved = np.concatenate([group.which for group in self._movements])
-        free = np.tile(FREE, len(moved) // POSE_NUMBERS)
+        free = np.tile(POSE_SIGMA, len(moved) // POSE_NUMBERS)
         lasting = np.concatenate([np.empty(0, dtype=np.intp), *(group.which for group in self._lasting)])
         mixing = np.stack(self._columns, axis=1)
         return Priors(self._unknowns, mixing, self._blocks, moved, free, self._changes, lasting)

@@ -29,11 +29,7 @@ def draw(field: FieldMap, focal_px: Array, roll_sigma: float, count: int, rng: n
         side = rng.choice([-1.0, 1.0], count)
         x, y = x * side, y * side
     z = _log_uniform(LOWEST_M, HIGHEST_M, count, rng)
-    to_x = rng.uniform(-AIMED_AT * half_x, AIMED_AT * half_x, count) - x
-    to_y = rng.uniform(-AIMED_AT * half_y, AIMED_AT * half_y, count) - y
-    roll = roll_sigma * rng.normal(size=count)
-    rotations = rotations_of(np.arctan2(to_y, to_x), np.arctan2(z, np.hypot(to_x, to_y)), roll)
-    return Hypotheses.unbent(rotations, np.stack([x, y, z], axis=1), rng.choice(focal_px, count))
+    return _aimed(field, np.stack([x, y, z], axis=1), focal_px, roll_sigma, rng)
 
 
 def draw_at(
@@ -46,12 +42,19 @@ def draw_at(
     rng: np.random.Generator,
 ) -> Hypotheses:
     """Draw cameras within `radius_m` of a place (3,) m that look at the field."""
-    half_x, half_y = field.half_size.tolist()
     ways = rng.normal(size=(count, 3))
     ways *= (radius_m * np.cbrt(rng.uniform(size=count)) / np.linalg.norm(ways, axis=1))[:, None]
-    positions = place + ways
-    to_x = rng.uniform(-AIMED_AT * half_x, AIMED_AT * half_x, count) - positions[:, 0]
-    to_y = rng.uniform(-AIMED_AT * half_y, AIMED_AT * half_y, count) - positions[:, 1]
+    return _aimed(field, place + ways, focal_px, roll_sigma, rng)
+
+
+def _aimed(
+    field: FieldMap, positions: Array, focal_px: Array, roll_sigma: float, rng: np.random.Generator
+) -> Hypotheses:
+    """Draw cameras at positions (n, 3) that look at places on the field or a little beside it."""
+    count = len(positions)
+    half_x, half_y = AIMED_AT * field.half_size
+    to_x = rng.uniform(-half_x, half_x, count) - positions[:, 0]
+    to_y = rng.uniform(-half_y, half_y, count) - positions[:, 1]
     roll = roll_sigma * rng.normal(size=count)
     tilt = np.arctan2(positions[:, 2], np.hypot(to_x, to_y))
     return Hypotheses.unbent(rotations_of(np.arctan2(to_y, to_x), tilt, roll), positions, rng.choice(focal_px, count))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.geometry.camera import Array
+from worker.calibration.geometry.arrays import Array, take_rows
 
 FARTHEST_BENT = 0.06
 """Largest difference in bend between a hypothesis and the lens that undistorted the view."""
@@ -37,7 +37,7 @@ class Hypotheses:
         return len(self.positions)
 
     def __getitem__(self, chosen: NDArray[np.intp] | NDArray[np.bool_] | slice) -> Hypotheses:
-        return Hypotheses(self.rotations[chosen], self.positions[chosen], self.focal_px[chosen], self.bends[chosen])
+        return take_rows(self, chosen)
 
     @classmethod
     def joined(cls, several: list[Hypotheses]) -> Hypotheses:

@@ -39,20 +39,13 @@ LEAST_OVERLAP = 0.2
 other things lie along a line here and there, and a few lines of a pose are found by them alone. Right poses on
 rendered and real views overlap by 0.27 and more; a wrong one that saw 0.93 of its two lines in the grain of a floor
 did by 0.12."""
-RIVAL_OVERLAP, MORE_MISSED, FEW_MISSED, MORE_EXPLAINED, LESS_AGREEMENT = 0.8, 2.5, 0.05, 0.05, 0.15
-OWN_PAINT, MUCH_MORE_EXPLAINED, MORE_SEEN, ALIKE_EXPLAINED = 0.02, 0.2, 0.04, 0.01
-LESS_EXACT = 1.4
-"""Limits for a rival: a different pose that may be the true one. It agrees little less both ways, and misses no more
-than so many times as much of its lines and a few more, or explains more of the paint, or alone explains so much of
-it and overlaps with the lines by this part of what the best does. It is none where it explains nothing that the best
-does not explain, and the best explains more: a little if it misses as much, much if it misses less; or where the
-best explains as much and misses so much less: yard lines farther on, one of them where there is none. Nor is it one
-where it explains no more, and its lines lie so many times as far from it."""
+MORE_EXPLAINED = 0.05
+"""Share of the paint by which one of two poses explains more than the other."""
 LEAST_SURE = 0.0025
 """Largest standard deviation (rms) of the markings in view by the best pose, as a part of the width of the frame,
-through a lens that is known and one that is found. Pose and lens that slide together, one to make up for the other,
-keep every limit of a pose alone. Right ones on rendered views are sure to 0.0012 and better where the lens is found,
-wrong ones to 0.006 and worse."""
+through a lens that is known; half of it through one that is found. Pose and lens that slide together, one to make up
+for the other, keep every limit of a pose alone. Right ones on rendered views are sure to 0.0012 and better where the
+lens is found, wrong ones to 0.006 and worse."""
 
 Reason = Literal["no-lines", "lines", "few-lines", "implausible", "not-unique", "not-confirmed"]
 
@@ -233,20 +226,24 @@ def sees_all_of_its_frame(lens: Lens) -> bool:
 
 
 def explains_nearly_as_well(other: Candidate, best: Candidate) -> bool:
-    """True if another candidate may be the true one: it misses little more, and explains little less of the paint."""
-    if other.agreement < best.agreement - LESS_AGREEMENT:
+    """True if another candidate may be the true one.
+
+    It agrees little less both ways; and it misses hardly more of its lines, or explains more of the paint, or explains
+    paint that the best does not and overlaps with the lines nearly as the best does. It may not if it explains nothing
+    of its own and the best outdoes it, nor if it explains no more and lines lie clearly farther from it.
+    """
+    if other.agreement < best.agreement - 0.15:
         return False
     missed, other_missed = (1 - one.evidence.agreement for one in (best, other))
-    has_paint_of_its_own = share(other.explains & ~best.explains) > OWN_PAINT
+    has_paint_of_its_own = share(other.explains & ~best.explains) > 0.02
     if not has_paint_of_its_own and _is_outdone(other, best):
         return False
     if other.explained <= best.explained and _is_less_exact(other, best):
         return False
     return (
-        other_missed < MORE_MISSED * missed + FEW_MISSED
+        other_missed < 2.5 * missed + 0.05
         or other.explained > best.explained + MORE_EXPLAINED
-        # A pose that misses clearly more, and explains nothing beyond the best, is a worse reading of the same.
-        or (has_paint_of_its_own and other.overlap.iou > RIVAL_OVERLAP * best.overlap.iou)
+        or (has_paint_of_its_own and other.overlap.iou > 0.8 * best.overlap.iou)
     )
 
 
@@ -254,16 +251,20 @@ def _is_less_exact(other: Candidate, best: Candidate) -> bool:
     """True if both were measured and lines lie clearly farther from the other one."""
     if other.residual_px is None or best.residual_px is None:
         return False
-    return other.residual_px > LESS_EXACT * best.residual_px
+    return other.residual_px > 1.4 * best.residual_px
 
 
 def _is_outdone(other: Candidate, best: Candidate) -> bool:
-    """True if the best of two that explain the same paint explains more of it, or sees more of its lines."""
+    """True if the best of two that explain the same paint explains more of it, or sees more of its lines.
+
+    It explains a little more if the other misses as many lines, much more if the other misses fewer, and as much if the
+    other misses clearly more: yard lines farther on, one of them where there is none.
+    """
     misses_more = best.evidence.agreement - other.evidence.agreement
     explains_less = best.explained - other.explained
-    if misses_more > MORE_SEEN:
-        return explains_less > -ALIKE_EXPLAINED
-    return explains_less > (MORE_EXPLAINED if misses_more >= 0 else MUCH_MORE_EXPLAINED)
+    if misses_more > 0.04:
+        return explains_less > -0.01
+    return explains_less > (MORE_EXPLAINED if misses_more >= 0 else 0.2)
 
 
 def twin(camera: Camera) -> Camera:

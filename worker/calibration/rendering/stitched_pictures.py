@@ -16,8 +16,6 @@ from worker.calibration.stitching.photometric_alignment import evened_out
 from worker.calibration.stitching.photometry import Light
 from worker.calibration.stitching.views import StitchedView, ViewFromAbove
 
-# Least length of the pitch in the bird's-eye view, in pixels: courts are small.
-BIRDSEYE_LENGTH = 800
 NOT_KNOWN: Mapping[str, Light] = MappingProxyType({})
 
 
@@ -56,10 +54,10 @@ def birdseye(
 ) -> Frame:
     """Draw the field from straight above, BGR: x to the right, y up, the field's centre in the centre pixel.
 
-    `pixels_per_metre`: unless said 10, and more where the field would come out shorter than `BIRDSEYE_LENGTH`.
+    `pixels_per_metre`: unless said 10, and more where the field would come out shorter than 800 pixels.
     `frames[camera.id]`: BGR (height, width, 3) of the size of the camera's intrinsics.
     """
-    pixels_per_metre = pixels_per_metre or max(10.0, BIRDSEYE_LENGTH / pitch.length)
+    pixels_per_metre = pixels_per_metre or max(10.0, 800 / pitch.length)
     columns = round((pitch.length / 2 + margin_m) * pixels_per_metre)
     rows = round((pitch.width / 2 + margin_m) * pixels_per_metre)
     view = ViewFromAbove(1 / pixels_per_metre, (2 * columns + 1, 2 * rows + 1))

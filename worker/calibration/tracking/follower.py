@@ -19,11 +19,6 @@ from worker.calibration.refinement.uncertainty import Sigma
 from worker.calibration.tracking.line_observations import Sighting, TrackedLines
 from worker.calibration.tracking.motion_filter import GATE, FilterStep, State, smoothed
 
-FIRST_SEARCH_PX = (28.0, *REFINEMENT_SEARCH_PX)
-"""Half width of the first frame's search round by round, in pixels of a 4K frame: it may be taken at the end of a
-swing."""
-
-
 How = Literal["measured", "coasted", "refused"]
 
 
@@ -203,7 +198,9 @@ def _references(pitch: Field, cameras: Sequence[Camera], first: Mapping[str, Fra
     responses = [np.zeros(first[camera.id].shape[:2], np.float32) for camera in cameras]
     observations = Observations([Channels([first[camera.id]]) for camera in cameras], responses)
     found = []
-    for one in refine(pitch, cameras, observations, 0.5, searches_px=FIRST_SEARCH_PX).each:
+    # Half width of the first frame's search round by round, in pixels of a 4K frame: it may be taken at the end of a
+    # swing.
+    for one in refine(pitch, cameras, observations, 0.5, searches_px=(28.0, *REFINEMENT_SEARCH_PX)).each:
         # Least share of lines, beyond chance, that the first frame has to show where the cameras are found.
         if one.covariance is None or one.evidence.agreement < 0.3:
             raise _not_seen(one.camera)

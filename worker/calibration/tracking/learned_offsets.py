@@ -9,8 +9,6 @@ from worker.calibration.geometry.camera import Array
 
 FORGOTTEN_IN_S = 3600.0
 """Time after which a sight counts 1/e: the sun and the ground move a line's place within a day."""
-FADED = 0.01
-"""Share of one fresh sight below which a piece counts as never seen."""
 
 
 class LearnedOffsets:
@@ -40,7 +38,8 @@ class LearnedOffsets:
     @property
     def are_known(self) -> NDArray[np.bool_]:
         """True for pieces (N,) that have been seen, not too long ago."""
-        return self._information > FADED * self._by_sight
+        # Share of one fresh sight below which a piece counts as never seen.
+        return self._information > 0.01 * self._by_sight
 
     def are_seen_as_often(self, share: float) -> NDArray[np.bool_]:
         """True for pieces (N,) that have been seen of late at least `share`, 0..1, as often as the one that was seen

@@ -14,10 +14,12 @@ from numpy.typing import NDArray
 from worker.calibration.detection.contrast import Channels, PixelReader
 from worker.calibration.detection.line_matching import known_contrasts
 from worker.calibration.detection.line_measurement import LineProfiles
-from worker.calibration.geometry.camera import Array, Camera, Frame
+from worker.calibration.geometry.arrays import Array, take_rows
+from worker.calibration.geometry.camera import Camera, Frame
 from worker.calibration.geometry.derivatives import POSE_NUMBERS, change_between, moved, pixel_jacobian
 from worker.calibration.geometry.field import Field, LinePoints
 from worker.calibration.geometry.visibility import VisibleLines
+from worker.calibration.refinement.estimate import POSE_SIGMA
 from worker.calibration.refinement.least_squares import CLUSTER_POINTS
 from worker.calibration.robust import huber_weights, tukey_weights
 from worker.calibration.tracking.learned_offsets import LearnedOffsets
@@ -35,10 +37,7 @@ AT_REFERENCE_PX = 3.0
 """Half width of the search for markings near the reference, in pixels of a 4K frame."""
 NOISE_PX = 0.1
 """Least error of the measurement of a piece, in pixels of the frame."""
-PRIOR = np.diag(np.repeat([0.03, 1.0], 3) ** -2.0)
-"""Information (6, 6) without any line, standard deviations of 0.03 rad and a metre: it holds the directions of which
-lines say nothing; much wider than any motion that is followed."""
-STEPS = 3
+PRIOR = np.diag(POSE_SIGMA**-2)
 
 
 @dataclass(frozen=True)
@@ -57,9 +56,7 @@ class LineObservations:
     share: float
 
     def __getitem__(self, chosen: NDArray[np.bool_]) -> LineObservations:
-        return LineObservations(
-            self.expected, self.piece[chosen], self.offset[chosen], self.jacobian[chosen], self.share
-        )
+        return take_rows(self, chosen)
 
 
 @dataclass(frozen=True)
@@ -187,8 +184,8 @@ class TrackedLines:
             return None
         found = read.profiles.measure(expected, read.lines, search_px * self._scale)
         points = found.points.position
-        offset = np.sum((found.pixel - expected.project(points)) * found.normal, axis=1)
-        jacobian = np.einsum("mij,mi->mj", pixel_jacobian(expected, points), found.normal)
+        # The measured offset falls as the expected place moves.
+        offset, jacobian = found.offset(expected, points), -found.jacobian(expected, points)
         good = np.isfinite(offset) & np.isfinite(jacobian).all(axis=1)
         share = good.sum() / len(read.pieces)
         if good.sum() < FEWEST_PIECES or share < 0.3 * self._usual:
@@ -211,7 +208,7 @@ class TrackedLines:
         sigma = self._sigma(seen)
         rows, values = seen.jacobian / sigma[:, None], (seen.offset - self._beside.mean[seen.piece]) / sigma
         change = np.zeros(POSE_NUMBERS)
-        for weigh in (*STEPS * [huber_weights], *STEPS * [tukey_weights]):
+        for weigh in (*3 * [huber_weights], *3 * [tukey_weights]):
             weight = weigh(values - rows @ change)
             information = (rows * weight[:, None]).T @ rows
             change = np.asarray(np.linalg.solve(information + PRIOR, rows.T @ (weight * values)), float)
