@@ -15,7 +15,7 @@ def differences(of, steps):
 
 
 def assert_alike(jacobian, expected, of, within=1e-6):
-    """That slopes are what is expected but for a millionth of the largest along the axes `of`."""
+    """Assert that a Jacobian is what is expected but for a millionth of the largest along the axes `of`."""
     assert jacobian.shape == expected.shape
     if expected.size:
         assert np.all(np.abs(jacobian - expected) <= within * np.abs(expected).max(axis=of, keepdims=True))

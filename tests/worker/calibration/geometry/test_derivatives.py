@@ -97,14 +97,14 @@ def test_what_is_seen_on_the_ground_moves_as_a_pose_that_is_a_little_wrong_puts_
     np.testing.assert_allclose(jacobian, differences(put, POSE_STEPS), rtol=1e-4, atol=1e-2)
 
 
-def test_points_on_a_grid_have_the_slopes_that_they_have_in_a_row():
+def test_points_on_a_grid_have_the_derivatives_that_they_have_in_a_row():
     one = camera("opencv", 0.0, 10.0, 5.0, 2.0)
     points = in_view(one)[:60]
     for jacobian in (pixel_jacobian, ground_jacobian, lens_jacobian):
         np.testing.assert_array_equal(jacobian(one, points.reshape(6, 10, 3)).reshape(60, 2, 6), jacobian(one, points))
 
 
-def test_what_the_camera_cannot_see_has_no_slopes():
+def test_what_the_camera_cannot_see_has_no_derivatives():
     one = camera("fisheye", 0.0, 10.0, 0.0, 0.0)
     behind = np.array([[0.0, -80.0, 0.0], [0.0, -46.0, 10.0]])
     assert np.isnan(pixel_jacobian(one, behind)).all()
