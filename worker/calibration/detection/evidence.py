@@ -99,13 +99,13 @@ def evidence_of(
     tolerance, reach = max(TOLERANCE_PX * scale, 2.0), max(40.0 * scale, 24.0)
     seen = VisibleLines.from_camera(lines, camera)
     parts = []
-    for looked in match_lines(seen, channels, tolerance + reach, scale):
-        pieces = seen[looked.which]
-        where = pieces.pixel[:, None] + looked.shifts[None, :, None] * pieces.normal[:, None]
+    for matches in match_lines(seen, channels, tolerance + reach, scale):
+        pieces = seen[matches.which]
+        where = pieces.pixel[:, None] + matches.shifts[None, :, None] * pieces.normal[:, None]
         network = bilinear(response, where) / (MARKING * np.minimum(pieces.width_px, 1.0))[:, None]
-        strength = np.maximum(looked.along / LEAST_ALONG, network)
-        near = np.abs(looked.shifts) <= tolerance
-        away = np.abs(looked.shifts) > min(2 * tolerance + pieces.width_px.max(initial=0) / 2, reach)
+        strength = np.maximum(matches.along / LEAST_ALONG, network)
+        near = np.abs(matches.shifts) <= tolerance
+        away = np.abs(matches.shifts) > min(2 * tolerance + pieces.width_px.max(initial=0) / 2, reach)
         # As many shifts at a time as there are around the expected place, and all that there are beside a wide line.
         tries = min(int(near.sum()), int(away.sum()))
         hits = _any_of(strength[:, away] >= 1, tries)

@@ -97,7 +97,7 @@ def match_lines(seen: VisibleLines, channels: Channels, reach_px: float, relativ
     Each marking is looked for where it stands out most: in another channel than green only if green does not show it.
     What has another colour than a marking that is known not to be white is no match.
     """
-    looked, strength = _looked_for(seen, channels, reach_px, relative_size)
+    looked, strength = _match_channels(seen, channels, reach_px, relative_size)
     chosen = _strongest(strength)[seen.points.marking]
     return [
         of_class.where(chosen[of_class.which] == number, sign)
@@ -113,7 +113,7 @@ def known_contrasts(seen: VisibleLines, channels: Channels, reach_px: float, rel
 
     Luma replaces green for all markings that luma shows as well.
     """
-    _, strength = _looked_for(seen, channels, reach_px, relative_size)
+    _, strength = _match_channels(seen, channels, reach_px, relative_size)
     chosen = _strongest(strength)
     everywhere = np.ones(len(seen), dtype=bool)
     in_luma = {GREEN: _matches_in(channels, LUMA, seen, _bend(seen), everywhere, reach_px, relative_size)}
@@ -142,7 +142,7 @@ def match_known(
     return matches
 
 
-def _looked_for(
+def _match_channels(
     seen: VisibleLines, channels: Channels, reach_px: float, relative_size: float
 ) -> tuple[dict[int, list[Matches]], Array]:
     """Return the matches by channel, and the strengths of markings in them (see `_strengths`).
@@ -153,9 +153,9 @@ def _looked_for(
     everywhere, bend = np.ones(len(seen), dtype=bool), _bend(seen)
     looked = {GREEN: _matches_in(channels, GREEN, seen, bend, everywhere, reach_px, relative_size)}
     strength = _strengths(looked, seen)
-    wanted = (strength.max(axis=0) < LEAST_ALONG)[seen.points.marking] | (seen.points.colour != WHITE)
-    if wanted.any():
-        looked |= {c: _matches_in(channels, c, seen, bend, wanted, reach_px, relative_size) for c in (RED, BLUE)}
+    chosen = (strength.max(axis=0) < LEAST_ALONG)[seen.points.marking] | (seen.points.colour != WHITE)
+    if chosen.any():
+        looked |= {c: _matches_in(channels, c, seen, bend, chosen, reach_px, relative_size) for c in (RED, BLUE)}
         looked = _without_other_paint(looked, seen.points.colour)
         strength = _strengths(looked, seen)
     return looked, strength
@@ -217,23 +217,23 @@ def _matches_in(
     channel: int,
     seen: VisibleLines,
     bend: Array,
-    wanted: NDArray[np.bool_],
+    chosen: NDArray[np.bool_],
     reach_px: float,
     relative_size: float,
 ) -> list[Matches]:
-    """Return the matches of the `wanted` lines (N,), of curvature `bend` (N,), in one channel, by class of width."""
+    """Return the matches of the `chosen` lines (N,), of curvature `bend` (N,), in one channel, by class of width."""
     return [
         _matches_of(of_class, np.flatnonzero(which), picture, channel, seen, bend, reach_px, relative_size)
-        for of_class, which in _by_width(seen, wanted)
+        for of_class, which in _by_width(seen, chosen)
     ]
 
 
 def _by_width(
-    seen: VisibleLines, wanted: NDArray[np.bool_]
+    seen: VisibleLines, chosen: NDArray[np.bool_]
 ) -> Iterator[tuple[tuple[float, float, float], NDArray[np.bool_]]]:
-    """Yield each of `WIDTH_CLASSES_PX` and the mask (N,) of `wanted` lines of such a width."""
+    """Yield each of `WIDTH_CLASSES_PX` and the mask (N,) of `chosen` lines of such a width."""
     for low, high, sampling in WIDTH_CLASSES_PX:
-        yield (low, high, sampling), wanted & (seen.width_px >= low) & (seen.width_px < high)
+        yield (low, high, sampling), chosen & (seen.width_px >= low) & (seen.width_px < high)
 
 
 def _matches_of(

@@ -243,8 +243,8 @@ class _Offsets:
         ground = Ground.under(lines)
         rises = _rises(ground, measured)
         # The pose has not followed markings that were painted anew.
-        asked = ~np.isin(lines.marking[measured.index], found.repainted_markings)
-        gives = _given_way(ground, rises, measured, jacobian, asked * tukey_weights(offset / sigma), found.uneven_m)
+        followed = ~np.isin(lines.marking[measured.index], found.repainted_markings)
+        gives = _given_way(ground, rises, measured, jacobian, followed * tukey_weights(offset / sigma), found.uneven_m)
         swell = found.uneven_m * np.linalg.cholesky(np.linalg.inv(ground.precision))
         by_lens = _by_lens(camera, here[known], measured)
         # The pose follows what a lens has wrong: what of it is left moves lines.

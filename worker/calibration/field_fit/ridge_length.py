@@ -105,11 +105,11 @@ def _fitted(
     unknowns: Unknowns,
 ) -> tuple[Estimate, WeightedRows]:
     """Return the estimate of everything else for a field, and the weighted residuals of the lines there."""
-    here = Estimate.initial(pitch, cameras, unknowns)
+    estimate = Estimate.initial(pitch, cameras, unknowns)
     for _ in range(4):
-        unknowns = unknowns.around(here.pitch, here.lines)
-        here = gauss_newton_step(here, cameras, measured, unknowns, tukey_weights).to
-    return here, weigh_rows(here.rows(measured, unknowns), here.heights, unknowns, tukey_weights)
+        unknowns = unknowns.around(estimate.pitch, estimate.lines)
+        estimate = gauss_newton_step(estimate, cameras, measured, unknowns, tukey_weights).to
+    return estimate, weigh_rows(estimate.rows(measured, unknowns), estimate.heights, unknowns, tukey_weights)
 
 
 def _together(rows: WeightedRows, scale: float) -> float:

@@ -27,12 +27,12 @@ class MixedSteps:
         self._plain: list[Array] = []
         self._taken: list[Array] = []
 
-    def step(self, here: Estimate, made: GaussNewtonStep) -> Estimate:
-        """Return the next estimate after `here`, whose plain step was `made`."""
+    def step(self, estimate: Estimate, made: GaussNewtonStep) -> Estimate:
+        """Return the next estimate after `estimate`, whose plain step was `made`."""
         move = self._mixed(made.move)
         self._plain.append(made.move)
         self._taken.append(move)
-        return replace(here.moved(move, self._unknowns), uneven_m=made.to.uneven_m)
+        return replace(estimate.moved(move, self._unknowns), uneven_m=made.to.uneven_m)
 
     def _mixed(self, plain: Array) -> Array:
         last = min(3, len(self._plain))

@@ -47,36 +47,38 @@ class CrossChecks:
 
     def __init__(
         self,
-        here: Estimate,
+        estimate: Estimate,
         measured: Sequence[Measurements],
-        believed: Priors,
+        priors: Priors,
         found: Posterior,
         heights: Array,
     ) -> None:
         """Take `found` (A,), the posterior by all lines, on a ground of `heights` (K,)."""
-        self._here, self._believed, self._found, self._heights = here, believed, found, heights
+        self._estimate, self._priors, self._found, self._heights = estimate, priors, found, heights
         self._halves = [[its[_stretch(its) % 2 == half] for its in measured] for half in (0, 1)]
 
     def of(self, number: int) -> CrossCheck | None:
         """Return the cross-check of a camera; None where one half is too short, or no marking is in view."""
         if min(len(half[number]) for half in self._halves) < FEWEST_MEASUREMENTS:
             return None
-        pose = self._believed.mixing[POSE_NUMBERS * number : POSE_NUMBERS * (number + 1)]
-        rows = np.concatenate([pose, self._believed.lens_tonight(number)])
+        pose = self._priors.mixing[POSE_NUMBERS * number : POSE_NUMBERS * (number + 1)]
+        rows = np.concatenate([pose, self._priors.lens_tonight(number)])
         difference, covariance = self._difference
-        return cross_check(self._here.pitch, self._here.cameras[number], rows @ difference, rows @ covariance @ rows.T)
+        return cross_check(
+            self._estimate.pitch, self._estimate.cameras[number], rows @ difference, rows @ covariance @ rows.T
+        )
 
     @cached_property
     def _difference(self) -> tuple[Array, Array]:
         """Difference (A,) between the errors by the two halves, and the covariance (A, A) expected of it."""
-        here, believed, found, heights = self._here, self._believed, self._found, self._heights
-        changes = believed.mixing @ found.value
+        estimate, priors, found, heights = self._estimate, self._priors, self._found, self._heights
+        changes = priors.mixing @ found.value
         # The ground is one unknown more: what it swells by is the same under both halves.
-        mixing, prior = _with_ground(believed.mixing, found.certainty, here.ground_precision(believed.unknowns))
+        mixing, prior = _with_ground(priors.mixing, found.certainty, estimate.ground_precision(priors.unknowns))
         mean = np.concatenate([found.mean, np.zeros(len(heights))])
         values, covariances, noises = list[Array](), list[Array](), list[Array]()
         for half in self._halves:
-            sandwich = LineLikelihood(here, half, [None] * len(half), believed.unknowns).sandwich_at(changes, heights)
+            sandwich = LineLikelihood(estimate, half, [None] * len(half), priors.unknowns).sandwich_at(changes, heights)
             covariance = np.asarray(np.linalg.inv(mixing.T @ sandwich.bread @ mixing + prior), dtype=float)
             information_vector = sandwich.bread @ np.concatenate([changes, heights]) - sandwich.gradient
             values.append(covariance @ (mixing.T @ information_vector + prior @ mean))

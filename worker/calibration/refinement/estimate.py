@@ -124,12 +124,12 @@ class GaussNewtonStep:
 
 
 def gauss_newton_step(
-    here: Estimate, found: Sequence[Camera], measured: Sequence[Measurements], unknowns: Unknowns, weigh: Weigh
+    estimate: Estimate, found: Sequence[Camera], measured: Sequence[Measurements], unknowns: Unknowns, weigh: Weigh
 ) -> GaussNewtonStep:
     """Take one Gauss-Newton step for all unknowns; `found`: poses at which the weak prior is centred."""
-    equations = normal_equations(weigh_rows(here.rows(measured, unknowns), here.heights, unknowns, weigh))
-    prior = here.prior(unknowns)
-    gradient = equations.gradient + prior @ here.change_from(found)
+    equations = normal_equations(weigh_rows(estimate.rows(measured, unknowns), estimate.heights, unknowns, weigh))
+    prior = estimate.prior(unknowns)
+    gradient = equations.gradient + prior @ estimate.change_from(found)
     covariance = np.asarray(np.linalg.inv(equations.information + prior), dtype=float)
     move = -covariance @ gradient
-    return GaussNewtonStep(here.moved(move, unknowns), move, covariance)
+    return GaussNewtonStep(estimate.moved(move, unknowns), move, covariance)

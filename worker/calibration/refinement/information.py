@@ -66,12 +66,12 @@ class Sandwich:
         steep = normal_equations(weigh_rows(rows, heights, unknowns, tukey_derivatives))
         return cls(steep.information, equations.gradient, error_of_measurement(flat, equations.information))
 
-    def covariance_of_poses(self, here: Estimate) -> Array:
+    def covariance_of_poses(self, estimate: Estimate) -> Array:
         """Return the covariance (6 C, 6 C) of tonight's poses by the measurement alone.
 
         Huber's sandwich: the covariance of the gradient, between inverses of its Jacobian.
         """
-        weak = here.weak_prior()
+        weak = estimate.weak_prior()
         poses = len(weak)
         part = np.linalg.inv(self.bread[:poses, :poses] + weak)
         return np.asarray(part @ (self.spread[:poses, :poses] + weak) @ part, dtype=float)
@@ -82,18 +82,18 @@ class LineLikelihood:
 
     def __init__(
         self,
-        here: Estimate,
+        estimate: Estimate,
         measured: Sequence[Measurements],
         memories: Sequence[CameraMemory | None],
         unknowns: Unknowns,
     ) -> None:
-        self._here, self._unknowns = here, unknowns
-        self._tonight = here.rows(measured, unknowns)
-        self._remembered = _remembered(here, memories, unknowns)
+        self._estimate, self._unknowns = estimate, unknowns
+        self._tonight = estimate.rows(measured, unknowns)
+        self._remembered = _remembered(estimate, memories, unknowns)
 
     def information(self) -> MarginalInformation:
         """Return the information at the estimate."""
-        return self.information_at(np.zeros(self._unknowns.dense), self._here.heights)
+        return self.information_at(np.zeros(self._unknowns.dense), self._estimate.heights)
 
     def information_at(self, changes: Array, heights: Array) -> MarginalInformation:
         """Return the information after changes (D,) from the estimate, on a ground of `heights` (K,).
@@ -107,10 +107,10 @@ class LineLikelihood:
         if self._remembered:
             alone = [rows.shifted(changes, heights, unknowns) for rows in self._tonight]
             tonight = Sandwich.of(alone, heights, unknowns)
-        repeatability_covariance = tonight.covariance_of_poses(self._here)
+        repeatability_covariance = tonight.covariance_of_poses(self._estimate)
 
         # Whatever the ground: its heights are eliminated.
-        even = self._here.ground_precision(unknowns)
+        even = self._estimate.ground_precision(unknowns)
         of_heights = bread[dense:, dense:] + even
         effect: Array = np.asarray(np.linalg.solve(of_heights, bread[dense:, :dense]), dtype=float)
         towards = gradient[dense:] + even @ heights
@@ -130,18 +130,18 @@ class LineLikelihood:
         return Sandwich.of(rows, heights, self._unknowns)
 
 
-def _remembered(here: Estimate, memories: Sequence[CameraMemory | None], unknowns: Unknowns) -> list[Rows]:
+def _remembered(estimate: Estimate, memories: Sequence[CameraMemory | None], unknowns: Unknowns) -> list[Rows]:
     """Return the rows of all epochs, in the order of their views."""
-    rows, view = [], len(here.cameras)
-    for camera, memory in zip(here.cameras, memories, strict=True):
+    rows, view = [], len(estimate.cameras)
+    for camera, memory in zip(estimate.cameras, memories, strict=True):
         for epoch in () if memory is None else memory.epochs:
-            its = epoch.measurements(here.lines)
+            its = epoch.measurements(estimate.lines)
             if camera.ignored is not None:
                 its = its[camera.sees(its.pixel)]
             # An epoch has the lens of its time: what that differs by from tonight's is no error.
             differs = lens_values(camera.intrinsics) - lens_values(epoch.camera.intrinsics)
             if len(its) >= FEWEST_MEASUREMENTS:
-                made = Rows.of(here.lines.position, epoch.camera, view, its, unknowns)
+                made = Rows.of(estimate.lines.position, epoch.camera, view, its, unknowns)
                 rows.append(replace(made, offset=made.offset + _by_lens(made, unknowns, view, differs)))
             view += 1
     return rows

@@ -90,7 +90,7 @@ class Priors:
 
 
 def build_priors(
-    here: Estimate,
+    estimate: Estimate,
     stored: Sequence[Camera],
     memories: Sequence[CameraMemory | None],
     unknowns: Unknowns,
@@ -101,15 +101,15 @@ def build_priors(
 
     `unknowns`: those of `unknowns_of`, and `information` (D, D) of the lines on them.
     """
-    errors = _Errors(here, memories, unknowns, solved, information)
-    errors.add_solved(here.values)
+    errors = _Errors(estimate, memories, unknowns, solved, information)
+    errors.add_solved(estimate.values)
     errors.add_field()
     for number, (before, memory) in enumerate(zip(stored, memories, strict=True)):
         if memory is None:
             errors.add_camera(number, before)
         else:
             errors.add_remembered(number, memory)
-    return errors.believed()
+    return errors.to_priors()
 
 
 class _Errors:
@@ -120,13 +120,13 @@ class _Errors:
 
     def __init__(
         self,
-        here: Estimate,
+        estimate: Estimate,
         memories: Sequence[CameraMemory | None],
         unknowns: Unknowns,
         solved: Unknowns,
         information: Array,
     ) -> None:
-        self._cameras, self._solved, self._unknowns = here.cameras, solved, unknowns
+        self._cameras, self._solved, self._unknowns = estimate.cameras, solved, unknowns
         self._owner_of = _owners(memories)
         self._first = POSE_NUMBERS * unknowns.views
         of_poses = information[: self._first, : self._first] + np.diag(np.tile(POSE_SIGMA**-2, unknowns.views))
@@ -142,7 +142,7 @@ class _Errors:
         self._changes: dict[str, NDArray[np.intp]] = {}
         self._lasting: list[Group] = []
 
-    def believed(self) -> Priors:
+    def to_priors(self) -> Priors:
         """Return the priors of all errors added."""
         moved = np.concatenate([group.which for group in self._movements])
         free = np.tile(POSE_SIGMA, len(moved) // POSE_NUMBERS)
@@ -296,7 +296,7 @@ def _owners(memories: Sequence[CameraMemory | None]) -> list[int]:
     return [*range(len(memories)), *(n for n, memory in enumerate(memories) if memory for _ in memory.epochs)]
 
 
-def unknowns_of(here: Estimate, memories: Sequence[CameraMemory | None], solved: Unknowns) -> Unknowns:
+def unknowns_of(estimate: Estimate, memories: Sequence[CameraMemory | None], solved: Unknowns) -> Unknowns:
     """Return all unknowns of all views that may be off, found with `solved` unknown.
 
     Heat and zoom rings change the focal length by a parameter of each view.
@@ -304,10 +304,12 @@ def unknowns_of(here: Estimate, memories: Sequence[CameraMemory | None], solved:
     owner_of = _owners(memories)
     views = len(owner_of)
     known = {(getattr(p, "camera", None), p.name) for p in solved.parameters}
-    suspects: list[Parameter] = [*lens_parameters_without_heat(here.cameras), *field_parameters(here.pitch)]
+    suspects: list[Parameter] = [*lens_parameters_without_heat(estimate.cameras), *field_parameters(estimate.pitch)]
     heats = [
         LensParameter(
-            _heat_number(views, view), "focal_length_px", HEAT_FOCAL * here.cameras[owner].intrinsics.focal_length_px
+            _heat_number(views, view),
+            "focal_length_px",
+            HEAT_FOCAL * estimate.cameras[owner].intrinsics.focal_length_px,
         )
         for view, owner in enumerate(owner_of)
     ]
@@ -316,7 +318,7 @@ def unknowns_of(here: Estimate, memories: Sequence[CameraMemory | None], solved:
         [*solved.parameters, *(p for p in suspects if (getattr(p, "camera", None), p.name) not in known), *heats],
         solved.ground,
         [(owner, _heat_number(views, view)) for view, owner in enumerate(owner_of)],
-    ).around(here.pitch, here.lines)
+    ).around(estimate.pitch, estimate.lines)
 
 
 def _heat_number(views: int, view: int) -> int:

@@ -135,9 +135,9 @@ def refine(
         caught = refiner.catch(begun, searches_px)
     last = refiner.settle(caught)
     uneven = last.unevenness(unknowns, unknowns.ground.ordinary)
-    here = replace(last.to, uneven_m=uneven)
+    estimate = replace(last.to, uneven_m=uneven)
     # Judged by a wider search than the last round's, which could not see an error larger than itself.
-    return _with_pose_shift_if_corrected(_assessed(here, stored or cameras, remembered, refiner), here, refiner)
+    return _with_pose_shift_if_corrected(_assessed(estimate, stored or cameras, remembered, refiner), estimate, refiner)
 
 
 @dataclass(frozen=True)
@@ -152,9 +152,11 @@ class _Refiner:
     repainted: NDArray[np.intp]
     found: Sequence[Camera]
 
-    def measure(self, here: Estimate, search_px: float) -> list[Measurements]:
+    def measure(self, estimate: Estimate, search_px: float) -> list[Measurements]:
         """Measure the lines within `search_px` (of a 4K frame) of where the cameras expect them, on their ground."""
-        return self.without_repainted(self.reader.measure(here.on_ground(self.unknowns), here.cameras, search_px))
+        return self.without_repainted(
+            self.reader.measure(estimate.on_ground(self.unknowns), estimate.cameras, search_px)
+        )
 
     def without_repainted(self, measured: Sequence[Measurements]) -> list[Measurements]:
         """Return the measurements without those of repainted markings."""
@@ -162,22 +164,22 @@ class _Refiner:
             return list(measured)
         return [found[~np.isin(found.points.marking, self.repainted)] for found in measured]
 
-    def around(self, here: Estimate) -> _Refiner:
+    def around(self, estimate: Estimate) -> _Refiner:
         """Return the refinement for the field of an estimate, which steps may have changed."""
-        return replace(self, unknowns=self.unknowns.around(here.pitch, here.lines))
+        return replace(self, unknowns=self.unknowns.around(estimate.pitch, estimate.lines))
 
-    def catch(self, here: Estimate, searches_px: Sequence[float]) -> Estimate:
+    def catch(self, estimate: Estimate, searches_px: Sequence[float]) -> Estimate:
         """Return the estimate after rounds with a narrower and narrower search, which catch the lines."""
         for search in searches_px:
-            this = self.around(here)
-            measured = this.measure(here, search)
+            this = self.around(estimate)
+            measured = this.measure(estimate, search)
             # Huber's loss has one minimum, wherever one begins; Tukey's, which outliers do not move, has several. One
             # step towards the nearest of those drops the outliers and still ends in one place (Bickel, 1975).
-            here = this.down_huber(here, measured)
-            here = this.towards_tukey(here, measured).to
-        return here
+            estimate = this.down_huber(estimate, measured)
+            estimate = this.towards_tukey(estimate, measured).to
+        return estimate
 
-    def settle(self, here: Estimate) -> GaussNewtonStep:
+    def settle(self, estimate: Estimate) -> GaussNewtonStep:
         """Return the step that leads to where the cameras stand still.
 
         What is read of a frame depends a little on where its pixels lie beside the lines. So the frames are read anew
@@ -186,9 +188,9 @@ class _Refiner:
         moves = list[float]()
         self.reader.read_anew()
         for _ in range(6):
-            last = replace(self.around(here), found=here.cameras).follow(here)
-            moves.append(last.to.largest_move_m(here))
-            here = last.to
+            last = replace(self.around(estimate), found=estimate.cameras).follow(estimate)
+            moves.append(last.to.largest_move_m(estimate))
+            estimate = last.to
             nearer = moves[-1] / moves[-2] if len(moves) > 1 else 1.0
             # Each reading moves the cameras by about the same part of what the one before did, and by no less than a
             # fifth of it: they have arrived where the next one would move them less than 0.1 mm.
@@ -197,15 +199,15 @@ class _Refiner:
             self.reader.read_anew()
         return last
 
-    def follow(self, here: Estimate) -> GaussNewtonStep:
+    def follow(self, estimate: Estimate) -> GaussNewtonStep:
         """Return the last of the steps to the lines as the frames have been read."""
         mixed, lengths = MixedSteps(self.unknowns), list[float]()
         for _ in range(12):
             # Half width of the search in the last rounds, which go on until the cameras stand still. Wide enough that
             # it is the robust weights which leave out a line point, and not the end of the search, which moves with the
             # cameras.
-            last = self.towards_tukey(here, self.measure(here, 5.0))
-            lengths.append(last.to.largest_move_m(here))
+            last = self.towards_tukey(estimate, self.measure(estimate, 5.0))
+            lengths.append(last.to.largest_move_m(estimate))
             # They end when cameras move less than this, or than such a part of the first step on the same reading, or
             # when so many steps were no shorter than one before: a line point that fits two shifts alike may go to and
             # fro.
@@ -213,24 +215,24 @@ class _Refiner:
                 lengths[:-PATIENCE], default=np.inf
             ):
                 break
-            here = mixed.step(here, last)
+            estimate = mixed.step(estimate, last)
         return last
 
-    def down_huber(self, here: Estimate, measured: Sequence[Measurements]) -> Estimate:
+    def down_huber(self, estimate: Estimate, measured: Sequence[Measurements]) -> Estimate:
         """Minimise Huber's loss of the same measurements."""
         for _ in range(MOST_STEPS):
-            before = here
-            here = gauss_newton_step(
-                here, self.found, with_misfit_noise(here, measured), self.unknowns, huber_weights
+            before = estimate
+            estimate = gauss_newton_step(
+                estimate, self.found, with_misfit_noise(estimate, measured), self.unknowns, huber_weights
             ).to
-            if here.largest_move_m(before) < 2e-4:
+            if estimate.largest_move_m(before) < 2e-4:
                 break
-        return here
+        return estimate
 
-    def towards_tukey(self, here: Estimate, measured: Sequence[Measurements]) -> GaussNewtonStep:
+    def towards_tukey(self, estimate: Estimate, measured: Sequence[Measurements]) -> GaussNewtonStep:
         """Take one step towards the minimum of Tukey's loss, and estimate the ground's unevenness there."""
-        measured = with_misfit_noise(here, measured)
-        made = gauss_newton_step(here, self.found, measured, self.unknowns, tukey_weights)
+        measured = with_misfit_noise(estimate, measured)
+        made = gauss_newton_step(estimate, self.found, measured, self.unknowns, tukey_weights)
         uneven = made.unevenness(self.unknowns, self.unknowns.ground.even)
         # A lens or a field that is wrong bends lines as a swelling ground does: the more of it, the flatter the ground.
         uneven /= 1 + (max(found.misfit_px for found in measured) / 0.3) ** 2
@@ -243,28 +245,30 @@ def _repainted_in_memory(remembered: Sequence[CameraMemory | None]) -> NDArray[n
     return np.unique(np.concatenate([np.empty(0), *known])).astype(np.intp)
 
 
-def _find_repainted(here: Estimate, remembered: Sequence[CameraMemory | None], refiner: _Refiner) -> NDArray[np.intp]:
+def _find_repainted(
+    estimate: Estimate, remembered: Sequence[CameraMemory | None], refiner: _Refiner
+) -> NDArray[np.intp]:
     """Return the markings that lie elsewhere than the memory of any camera has them: all see the same paint."""
     if not any(remembered):
         return refiner.repainted
-    measured = refiner.reader.measure(here.on_ground(refiner.unknowns), here.cameras, SEARCH_PX[0])
+    measured = refiner.reader.measure(estimate.on_ground(refiner.unknowns), estimate.cameras, SEARCH_PX[0])
     found = [
-        find_repainted_markings(memory, found, here.lines)
+        find_repainted_markings(memory, found, estimate.lines)
         for memory, found in zip(remembered, measured, strict=True)
         if memory is not None
     ]
     return np.unique(np.concatenate([refiner.repainted, *found]))
 
 
-def with_misfit_noise(here: Estimate, measured: Sequence[Measurements]) -> list[Measurements]:
+def with_misfit_noise(estimate: Estimate, measured: Sequence[Measurements]) -> list[Measurements]:
     """Return the measurements with their misfit: the error that neither noise nor paint nor ground explains.
 
     Lens and field are never quite what they are said to be, by pixels alike near and far. Without it, a far line that a
     wrong lens displaces by ten of its small sigmas would outweigh all near ones.
     """
     return [
-        replace(found, misfit_px=misfit_px(found.offset(camera, here.lines.position[found.index]), found))
-        for camera, found in zip(here.cameras, measured, strict=True)
+        replace(found, misfit_px=misfit_px(found.offset(camera, estimate.lines.position[found.index]), found))
+        for camera, found in zip(estimate.cameras, measured, strict=True)
     ]
 
 
@@ -278,11 +282,11 @@ def evaluate_poses(
 ) -> RefinedPoses:
     """Evaluate poses that are left as they are, with everything else; arguments as for `refine`."""
     unknowns = Unknowns(len(cameras), free, Ground.under(pitch.line_points()))
-    here = Estimate.initial(pitch, cameras, unknowns)
-    remembered = memories_of_field(memories or [None] * len(cameras), here.lines)
+    estimate = Estimate.initial(pitch, cameras, unknowns)
+    remembered = memories_of_field(memories or [None] * len(cameras), estimate.lines)
     refiner = _Refiner(observations.reader(), unknowns, _repainted_in_memory(remembered), cameras)
-    refiner = replace(refiner, repainted=_find_repainted(here, remembered, refiner))
-    return _assessed(here, stored or cameras, remembered, refiner)
+    refiner = replace(refiner, repainted=_find_repainted(estimate, remembered, refiner))
+    return _assessed(estimate, stored or cameras, remembered, refiner)
 
 
 def _each_alone(
@@ -302,50 +306,52 @@ def _each_alone(
 
 
 def _assessed(
-    here: Estimate, stored: Sequence[Camera], remembered: Sequence[CameraMemory | None], refiner: _Refiner
+    estimate: Estimate, stored: Sequence[Camera], remembered: Sequence[CameraMemory | None], refiner: _Refiner
 ) -> RefinedPoses:
-    refiner = refiner.around(here)
-    lines, reader = here.on_ground(refiner.unknowns), refiner.reader
-    evidence = reader.evidence(here.pitch, lines, here.cameras)
-    everything = _of_seen(reader.measure(lines, here.cameras, EVALUATION_SEARCH_PX), evidence)
-    measured = with_misfit_noise(here, refiner.without_repainted(everything))
+    refiner = refiner.around(estimate)
+    lines, reader = estimate.on_ground(refiner.unknowns), refiner.reader
+    evidence = reader.evidence(estimate.pitch, lines, estimate.cameras)
+    everything = _of_seen(reader.measure(lines, estimate.cameras, EVALUATION_SEARCH_PX), evidence)
+    measured = with_misfit_noise(estimate, refiner.without_repainted(everything))
     # A field that is wrong looks like a ground that swells a lot: judged, it has to be an ordinary ground.
-    ordinary = replace(here, uneven_m=min(here.uneven_m, refiner.unknowns.ground.usual_m))
+    ordinary = replace(estimate, uneven_m=min(estimate.uneven_m, refiner.unknowns.ground.usual_m))
     refined = estimate_uncertainty(ordinary, stored, remembered, measured, evidence, refiner.unknowns)
     each = [
         replace(one, measured=its, repainted_markings=tuple(refiner.repainted.tolist()))
-        for one, its in zip(refined.each, with_misfit_noise(here, everything), strict=True)
+        for one, its in zip(refined.each, with_misfit_noise(estimate, everything), strict=True)
     ]
     return replace(refined, each=each)
 
 
-def _with_pose_shift_if_corrected(refined: RefinedPoses, here: Estimate, refiner: _Refiner) -> RefinedPoses:
+def _with_pose_shift_if_corrected(refined: RefinedPoses, estimate: Estimate, refiner: _Refiner) -> RefinedPoses:
     """Return the poses, with the move of the cameras for each parameter of the field that the lines contradict."""
     measured = refiner.without_repainted([one.measured for one in refined.each if one.measured is not None])
     deviations = [
-        replace(one, moves_m=_moves_m(one, here, measured, refiner)) if one.camera is None and is_sure(one) else one
+        replace(one, moves_m=_moves_m(one, estimate, measured, refiner)) if one.camera is None and is_sure(one) else one
         for one in refined.deviations
     ]
     return replace(refined, deviations=deviations)
 
 
-def _moves_m(wrong: Deviation, here: Estimate, measured: Sequence[Measurements], refiner: _Refiner) -> dict[str, float]:
+def _moves_m(
+    wrong: Deviation, estimate: Estimate, measured: Sequence[Measurements], refiner: _Refiner
+) -> dict[str, float]:
     """Return the move (m) of each camera, by id, on the same measurements with a measure of the field corrected.
 
     Nothing for a number that no field can have otherwise.
     """
-    measure = next((one for one in field_measures(here.pitch) if one.name == wrong.name), None)
+    measure = next((one for one in field_measures(estimate.pitch) if one.name == wrong.name), None)
     if measure is None:
         return {}
-    _, pitch = measure.applied(here.cameras, here.pitch, wrong.value)
-    there = replace(here, pitch=pitch, lines=pitch.same_line_points(here.lines))
+    _, pitch = measure.applied(estimate.cameras, estimate.pitch, wrong.value)
+    there = replace(estimate, pitch=pitch, lines=pitch.same_line_points(estimate.lines))
     refiner = refiner.around(there)
     there = refiner.down_huber(there, measured)
     for _ in range(MOST_STEPS):
         there = refiner.towards_tukey(there, measured).to
     return {
         before.id: float(np.linalg.norm(after.pose.position - before.pose.position))
-        for before, after in zip(here.cameras, there.cameras, strict=True)
+        for before, after in zip(estimate.cameras, there.cameras, strict=True)
     }
 
 

@@ -215,14 +215,14 @@ class RefinedPoses:
 
 
 def estimate_uncertainty(
-    here: Estimate,
+    estimate: Estimate,
     stored: Sequence[Camera],
     memories: Sequence[CameraMemory | None],
     measured: Sequence[Measurements],
     evidence: Sequence[Evidence],
     solved: Unknowns,
 ) -> RefinedPoses:
-    """Return poses with covariances at the solution `here`, found with `solved` unknown.
+    """Return poses with covariances at the solution `estimate`, found with `solved` unknown.
 
     `stored`: poses of the cameras when they were last known; `memories`: of their earlier nights.
     """
@@ -230,24 +230,24 @@ def estimate_uncertainty(
         memory if memory is not None and len(found) >= FEWEST_MEASUREMENTS else None
         for memory, found in zip(memories, measured, strict=True)
     ]
-    unknowns = unknowns_of(here, memories, solved)
-    lines = LineLikelihood(here, measured, memories, unknowns)
+    unknowns = unknowns_of(estimate, memories, solved)
+    lines = LineLikelihood(estimate, measured, memories, unknowns)
     information = lines.information()
-    believed = build_priors(here, stored, memories, unknowns, solved, information.matrix)
+    priors = build_priors(estimate, stored, memories, unknowns, solved, information.matrix)
     # Number of times that lines are weighed again at the current estimate of everything.
     for _ in range(2):
-        changes = believed.mixing @ _posterior(believed, information).value
+        changes = priors.mixing @ _posterior(priors, information).value
         information = lines.information_at(changes, information.heights(changes))
-    joint = _JointPosterior.of(here, believed, information)
-    heights = information.heights(believed.mixing @ joint.found.value)
-    checks = CrossChecks(here, measured, believed, joint.found, heights)
+    joint = _JointPosterior.of(estimate, priors, information)
+    heights = information.heights(priors.mixing @ joint.found.value)
+    checks = CrossChecks(estimate, measured, priors, joint.found, heights)
     return joint.to_refined_poses(memories, measured, evidence, checks, solved)
 
 
-def _posterior(believed: Priors, information: MarginalInformation) -> Posterior:
+def _posterior(priors: Priors, information: MarginalInformation) -> Posterior:
     """Return the posterior of the independent errors, by their priors and the lines."""
-    mixing = believed.mixing
-    return posterior(mixing.T @ information.matrix @ mixing, mixing.T @ information.vector, believed.blocks)
+    mixing = priors.mixing
+    return posterior(mixing.T @ information.matrix @ mixing, mixing.T @ information.vector, priors.blocks)
 
 
 @dataclass(frozen=True)
@@ -258,8 +258,8 @@ class _JointPosterior:
     `MarginalInformation`.
     """
 
-    here: Estimate
-    believed: Priors
+    estimate: Estimate
+    priors: Priors
     found: Posterior
     by_lines: Array
     repeatability_covariance: Array
@@ -275,17 +275,17 @@ class _JointPosterior:
         return self.found.covariance
 
     @classmethod
-    def of(cls, here: Estimate, believed: Priors, information: MarginalInformation) -> _JointPosterior:
-        by_errors = believed.mixing.T @ information.matrix @ believed.mixing
-        found = _posterior(believed, information)
+    def of(cls, estimate: Estimate, priors: Priors, information: MarginalInformation) -> _JointPosterior:
+        by_errors = priors.mixing.T @ information.matrix @ priors.mixing
+        found = _posterior(priors, information)
         # The movement of a camera helps to tell a zoom from a move. That it has not moved is no measurement of where it
         # is: if the lenses are what they are said to be, lines alone have to determine it.
         certainty = found.certainty.copy()
-        for group in (group for block in believed.blocks for group in block):
+        for group in (group for block in priors.blocks for group in block):
             certainty[group.which] = np.maximum(certainty[group.which], group.certainty(1.0))
-        certainty[believed.movements] = np.minimum(found.certainty[believed.movements], believed.free**-2)
+        certainty[priors.movements] = np.minimum(found.certainty[priors.movements], priors.free**-2)
         by_lines = np.asarray(np.linalg.inv(by_errors + np.diag(certainty)), dtype=float)
-        return cls(here, believed, found, by_lines, information.repeatability_covariance)
+        return cls(estimate, priors, found, by_lines, information.repeatability_covariance)
 
     def to_refined_poses(
         self,
@@ -296,31 +296,31 @@ class _JointPosterior:
         solved: Unknowns,
     ) -> RefinedPoses:
         """Return the refined poses, the deviations, and the uncertainties of free parameters."""
-        cameras = self.here.cameras
+        cameras = self.estimate.cameras
         each = [
-            self._camera(number, memories[number], seen, its, checks, solved)
-            for number, (seen, its) in enumerate(zip(evidence, measured, strict=True))
+            self._camera(number, memories[number], seen, measurements, checks, solved)
+            for number, (seen, measurements) in enumerate(zip(evidence, measured, strict=True))
         ]
         parameter_uncertainties = [
             self._parameter_uncertainty(number) for number in range(POSE_NUMBERS * len(cameras), solved.dense)
         ]
-        return RefinedPoses(self.here.pitch, each, self._deviations(solved), parameter_uncertainties)
+        return RefinedPoses(self.estimate.pitch, each, self._deviations(solved), parameter_uncertainties)
 
     def _camera(
         self,
         number: int,
         memory: CameraMemory | None,
         seen: Evidence,
-        its: Measurements,
+        measurements: Measurements,
         checks: CrossChecks,
         solved: Unknowns,
     ) -> RefinedPose:
-        camera = self.here.cameras[number]
-        residual = rms_px(self.here.lines.position, camera, its)
-        if len(its) < FEWEST_MEASUREMENTS:
-            return RefinedPose(camera, seen, residual, None, None, None, None, uneven_m=self.here.uneven_m)
-        pose = self.believed.mixing[POSE_NUMBERS * number : POSE_NUMBERS * (number + 1)]
-        lens = self.believed.lens_tonight(number)
+        camera = self.estimate.cameras[number]
+        residual = rms_px(self.estimate.lines.position, camera, measurements)
+        if len(measurements) < FEWEST_MEASUREMENTS:
+            return RefinedPose(camera, seen, residual, None, None, None, None, uneven_m=self.estimate.uneven_m)
+        pose = self.priors.mixing[POSE_NUMBERS * number : POSE_NUMBERS * (number + 1)]
+        lens = self.priors.lens_tonight(number)
         away = pose @ self.value
         covariance = max(
             (pose @ one @ pose.T for one in (self.by_lines, self.covariance)),
@@ -340,12 +340,12 @@ class _JointPosterior:
             refined=self._refined(camera, pose, lens),
             lens_change=None if memory is None else self._lens_change(camera, memory),
             cross_checked=partial(checks.of, number),
-            uneven_m=self.here.uneven_m,
+            uneven_m=self.estimate.uneven_m,
         )
 
     def _since_stored(self) -> Array:
         """Return the errors (A,) with those of lens and field as they were expected: what has happened since."""
-        since, lasting = self.value.copy(), self.believed.lasting
+        since, lasting = self.value.copy(), self.priors.lasting
         since[lasting] = self.found.mean[lasting]
         return since
 
@@ -358,12 +358,12 @@ class _JointPosterior:
         """
         off = next((d for d in self._of_lens(number, solved) if d.name == FOCAL), None)
         since = self._since_stored()
-        row = self.believed.lens_tonight(number)[LENS_PARAMETERS.index(FOCAL)]
+        row = self.priors.lens_tonight(number)[LENS_PARAMETERS.index(FOCAL)]
         longer_px = float(row @ since)
         if off is None or abs(off.value) <= abs(longer_px):
             return off, self.value
         varies = row.copy()
-        varies[self.believed.lasting] = 0.0
+        varies[self.priors.lasting] = 0.0
         return replace(off, value=longer_px, sigma=float(np.sqrt(varies @ self.covariance @ varies))), since
 
     def _ground_sigma(self, camera: Camera, both: Array) -> GroundSigma | None:
@@ -372,16 +372,16 @@ class _JointPosterior:
         They may each be off by far more, and make up for each other. What the lines surely contradict is a misfit,
         which residual and diagnosis tell, and no uncertainty. None where no marking is in view.
         """
-        index = VisibleLines.from_camera(self.here.lines, camera).index
+        index = VisibleLines.from_camera(self.estimate.lines, camera).index
         if len(index) == 0:
             return None
         index = index[:: max(len(index) // 200, 1)]
-        jacobian = full_pixel_jacobian(camera, self.here.lines.position[index])
+        jacobian = full_pixel_jacobian(camera, self.estimate.lines.position[index])
         by_ground, all_of_it = -jacobian[..., 3:6], both
-        for at, parameter in enumerate(self.believed.unknowns.parameters, POSE_NUMBERS * self.believed.unknowns.views):
+        for at, parameter in enumerate(self.priors.unknowns.parameters, POSE_NUMBERS * self.priors.unknowns.views):
             if not isinstance(parameter, LensParameter):
                 jacobian = np.concatenate([jacobian, by_ground @ parameter.shift[index][..., None]], axis=-1)
-                all_of_it = np.concatenate([all_of_it, self.believed.mixing[at : at + 1]])
+                all_of_it = np.concatenate([all_of_it, self.priors.mixing[at : at + 1]])
         inverse = np.linalg.pinv(by_ground[..., :2])
         metres = pixels = np.zeros(len(index))
         for covariance in (self.by_lines, self.covariance):
@@ -401,19 +401,19 @@ class _JointPosterior:
     def _lens_change(self, camera: Camera, memory: CameraMemory) -> LensChange:
         """Return the change of the focal length since the first nights, an error of its own."""
         since = np.zeros(len(self.value))
-        since[self.believed.changes_of(camera.id)] = 1.0
+        since[self.priors.changes_of(camera.id)] = 1.0
         focal = camera.intrinsics.focal_length_px
         sigma = float(np.sqrt(since @ self.covariance @ since)) / focal
         return LensChange(memory.since, float(since @ self.value) / focal, sigma)
 
     def _deviations(self, solved: Unknowns) -> list[Deviation]:
         """Return the estimated errors of lenses and field that were not solved for."""
-        of_lenses = [one for number in range(len(self.here.cameras)) for one in self._of_lens(number, solved)]
+        of_lenses = [one for number in range(len(self.estimate.cameras)) for one in self._of_lens(number, solved)]
         return [*of_lenses, *self._of_field(solved)]
 
     def _of_lens(self, number: int, solved: Unknowns) -> list[Deviation]:
-        camera = self.here.cameras[number]
-        lens = self.believed.lens_tonight(number)
+        camera = self.estimate.cameras[number]
+        lens = self.priors.lens_tonight(number)
         value, variance = lens @ self.value, np.einsum("ia,ab,ib->i", lens, self.covariance, lens)
         free = {(p.camera, p.name) for p in solved.parameters if isinstance(p, LensParameter)}
         return [
@@ -423,22 +423,22 @@ class _JointPosterior:
         ]
 
     def _of_field(self, solved: Unknowns) -> list[Deviation]:
-        first, free = POSE_NUMBERS * self.believed.unknowns.views, {p.name for p in solved.parameters}
-        deviations, care = [], careful_measurement(self.here.pitch)
-        for at, parameter in enumerate(self.believed.unknowns.parameters, first):
+        first, free = POSE_NUMBERS * self.priors.unknowns.views, {p.name for p in solved.parameters}
+        deviations, care = [], careful_measurement(self.estimate.pitch)
+        for at, parameter in enumerate(self.priors.unknowns.parameters, first):
             if isinstance(parameter, LensParameter) or parameter.name in free:
                 continue
-            row = self.believed.mixing[at]
+            row = self.priors.mixing[at]
             value, sigma = float(row @ self.value), float(np.sqrt(row @ self.covariance @ row))
             deviations.append(Deviation(None, parameter.name, value, sigma, care[parameter.name]))
         return deviations
 
     def _parameter_uncertainty(self, number: int) -> ParameterUncertainty:
         """Return the uncertainty of a free parameter, `number` among the unknowns that were solved for."""
-        unknowns = self.believed.unknowns
+        unknowns = self.priors.unknowns
         first = POSE_NUMBERS * unknowns.views
-        at = number - POSE_NUMBERS * len(self.here.cameras)
-        rows = self.believed.mixing[first : first + len(unknowns.parameters)]
+        at = number - POSE_NUMBERS * len(self.estimate.cameras)
+        rows = self.priors.mixing[first : first + len(unknowns.parameters)]
         covariance = rows @ self.by_lines @ rows.T
         variance = np.diag(covariance)
         together = np.sqrt(variance * variance[at])

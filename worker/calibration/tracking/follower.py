@@ -171,7 +171,7 @@ class _Track:
         sighting = self._sighted(picture, expected)
         if sighting is None:
             return "coasted", expected
-        if expected.surprise(sighting.observed) > GATE or not self.lines.fits(sighting, self._is_refused):
+        if expected.squared_innovation(sighting.observed) > GATE or not self.lines.fits(sighting, self._is_refused):
             self._is_refused = True
             return "refused", expected
         self._is_refused = False

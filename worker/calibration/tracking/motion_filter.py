@@ -58,28 +58,30 @@ class State:
 
     def after(self, seconds: float) -> State:
         """Return the state predicted so long after."""
-        onward = _onward(seconds)
-        return State(onward @ self.mean, onward @ self.covariance @ onward.T + _unforeseen(seconds))
+        transition = _transition(seconds)
+        return State(transition @ self.mean, transition @ self.covariance @ transition.T + _process_noise(seconds))
 
     def with_mast_prior(self, seconds: float) -> State:
         """Return the state with the prior of a mast over so long a time: next to nothing where lines are seen."""
         information = np.diag(np.repeat([BACK_RAD, BACK_M], 3) ** -2.0) * seconds
         return self.with_observed(PoseObservation(np.zeros(POSE_NUMBERS), information))
 
-    def surprise(self, observed: PoseObservation) -> float:
+    def squared_innovation(self, observed: PoseObservation) -> float:
         """Return the squared innovation in its own standard deviations: about the number of observed directions, if
         all is well."""
-        away, root, known = self._weighed(observed)
-        return float(away @ root @ np.linalg.solve(known, root.T @ away))
+        innovation, root, innovation_covariance = self._innovation(observed)
+        return float(innovation @ root @ np.linalg.solve(innovation_covariance, root.T @ innovation))
 
     def with_observed(self, observed: PoseObservation) -> State:
         """Return the state updated by a frame, in Joseph's form: a covariance that stays one."""
-        away, root, known = self._weighed(observed)
-        gain = np.linalg.solve(known, (self.covariance[:, :POSE_NUMBERS] @ root).T).T
-        kept = np.eye(len(self.mean)) - np.pad(gain @ root.T, ((0, 0), (0, POSE_NUMBERS)))
-        return State(self.mean + gain @ (root.T @ away), kept @ self.covariance @ kept.T + gain @ gain.T)
+        innovation, root, innovation_covariance = self._innovation(observed)
+        gain = np.linalg.solve(innovation_covariance, (self.covariance[:, :POSE_NUMBERS] @ root).T).T
+        remainder = np.eye(len(self.mean)) - np.pad(gain @ root.T, ((0, 0), (0, POSE_NUMBERS)))
+        return State(
+            self.mean + gain @ (root.T @ innovation), remainder @ self.covariance @ remainder.T + gain @ gain.T
+        )
 
-    def _weighed(self, observed: PoseObservation) -> tuple[Array, Array, Array]:
+    def _innovation(self, observed: PoseObservation) -> tuple[Array, Array, Array]:
         """Return the innovation (6,), a root (6, 6) of the frame's information, and the covariance (6, 6) of the
         innovation through that root: no unknown direction has to be inverted."""
         values, vectors = np.linalg.eigh(observed.information)
@@ -89,33 +91,33 @@ class State:
 
 @dataclass(frozen=True)
 class FilterStep:
-    """Moment of a filter: the state `known` after its frame. `seconds`: since the moment before."""
+    """Moment of a filter: its `state` after the frame. `seconds`: since the moment before."""
 
     seconds: float
-    known: State
+    state: State
 
 
 def smoothed(steps: Sequence[FilterStep]) -> list[State]:
     """Return the state of each moment given all of them."""
-    known = [steps[-1].known]
+    states = [steps[-1].state]
     for before, later in zip(reversed(steps[:-1]), reversed(steps[1:]), strict=True):
-        onward, foretold = _onward(later.seconds), before.known.after(later.seconds)
-        gain = np.linalg.solve(foretold.covariance, onward @ before.known.covariance).T
-        kept = np.eye(len(gain)) - gain @ onward
-        mean = before.known.mean + gain @ (known[-1].mean - foretold.mean)
+        transition, predicted = _transition(later.seconds), before.state.after(later.seconds)
+        gain = np.linalg.solve(predicted.covariance, transition @ before.state.covariance).T
+        remainder = np.eye(len(gain)) - gain @ transition
+        mean = before.state.mean + gain @ (states[-1].mean - predicted.mean)
         # A sum of positive semidefinite matrices.
-        later_too = known[-1].covariance + _unforeseen(later.seconds)
-        known.append(State(mean, kept @ before.known.covariance @ kept.T + gain @ later_too @ gain.T))
-    return known[::-1]
+        later_covariance = states[-1].covariance + _process_noise(later.seconds)
+        states.append(State(mean, remainder @ before.state.covariance @ remainder.T + gain @ later_covariance @ gain.T))
+    return states[::-1]
 
 
-def _onward(seconds: float) -> Array:
-    onward = np.eye(2 * POSE_NUMBERS)
-    onward[:POSE_NUMBERS, POSE_NUMBERS:] = seconds * np.eye(POSE_NUMBERS)
-    return onward
+def _transition(seconds: float) -> Array:
+    transition = np.eye(2 * POSE_NUMBERS)
+    transition[:POSE_NUMBERS, POSE_NUMBERS:] = seconds * np.eye(POSE_NUMBERS)
+    return transition
 
 
-def _unforeseen(seconds: float) -> Array:
+def _process_noise(seconds: float) -> Array:
     """Return the covariance (12, 12) of a state by accelerations that are constant over the time."""
     # A mast in wind: 0.3 degrees at 0.5 Hz and a tenth of that at 3 Hz and more.
     variance = np.diag(np.repeat([np.radians(15.0), 1.0], 3) ** 2)

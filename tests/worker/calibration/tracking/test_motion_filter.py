@@ -77,12 +77,13 @@ def test_surprise_is_as_large_as_chance_has_it_and_a_jump_exceeds_the_gate():
     state = filtered(np.zeros((50, 6)))[-1].known.after(FRAME_S)
     spread = np.linalg.cholesky(state.change_covariance + np.diag(NOISE**2))
     found = [
-        state.surprise(PoseObservation(state.change + spread @ rng.normal(size=6), INFORMATION)) for _ in range(2000)
+        state.squared_innovation(PoseObservation(state.change + spread @ rng.normal(size=6), INFORMATION))
+        for _ in range(2000)
     ]
     assert np.mean(found) == pytest.approx(6, rel=0.1)
     assert max(found) < GATE
     jump = np.radians([0.5, 0, 0, 0, 0, 0])
-    assert state.surprise(PoseObservation(state.change + jump, INFORMATION)) > GATE
+    assert state.squared_innovation(PoseObservation(state.change + jump, INFORMATION)) > GATE
 
 
 def test_a_direction_of_which_nothing_is_seen_stays_as_it_was():
