@@ -24,7 +24,6 @@ Grey = NDArray[np.uint8]
 FEWEST_FOLLOWED = 30
 """Fewest corners to be found again in a frame; with fewer it is taken for still."""
 GRID_PX = 32
-BAND_ROWS = 128
 
 
 @dataclass(frozen=True)
@@ -79,8 +78,9 @@ def median(pictures: Sequence[NDArray[np.uint8]], swayed: Sequence[Sway]) -> NDA
         return pictures[0].astype(np.float32)
     planes = [np.ascontiguousarray(picture) for picture in pictures]
     still = np.empty(planes[0].shape, dtype=np.float32)
-    for top in range(0, len(still), BAND_ROWS):
-        bottom = min(top + BAND_ROWS, len(still))
+    band_rows = 128
+    for top in range(0, len(still), band_rows):
+        bottom = min(top + band_rows, len(still))
         still[top:bottom] = np.median(
             [sway.rows(plane, top, bottom) for plane, sway in zip(planes, swayed, strict=True)], axis=0
         )

@@ -37,8 +37,6 @@ WIDTH_CLASSES_PX = ((0.3, 3.0, 0.5), (3.0, 10.0, 0.5), (10.0, 30.0, 1.0), (30.0,
 """Classes of line widths (from, to, sampling step): lines of one class share a filter length and a step."""
 BESIDE_PX = 4.0
 """Width of grass on each side that belongs to the filter, beyond a third of the line's width."""
-GRID_PX = 16.0
-"""Spacing of the fixed points of the picture from which sampling places are counted."""
 LEAST_ALONG = 0.5
 """Mean correlation with the expected profile, over 40 px of a 4K frame, from which a ridge is a line by itself."""
 
@@ -271,7 +269,9 @@ def _beside_grid(pieces: VisibleLines, sampling_px: float) -> Array:
     Sampling places stand fast in the picture. Else what is read of a line would depend a little on where it was
     expected.
     """
-    fixed = GRID_PX * np.round(pieces.pixel / GRID_PX)
+    # Spacing of the fixed points of the picture from which sampling places are counted.
+    grid_px = 16.0
+    fixed = grid_px * np.round(pieces.pixel / grid_px)
     beside = np.sum((pieces.pixel - fixed) * pieces.normal, axis=1)
     return np.asarray(sampling_px * np.round(beside / sampling_px) - beside)
 

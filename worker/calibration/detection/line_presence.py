@@ -18,14 +18,8 @@ from worker.calibration.detection.streaks import LEAST_CONTRAST, Streaks
 from worker.calibration.geometry.camera import Array, Frame
 from worker.calibration.geometry.visibility import VisibleLines
 
-COARSE_PX = 6
-"""Step between the shifts that are tried; streaks are widened by as much."""
-NEAR_PX = 12
-"""Largest distance of a line from the common shift: a turn bends what it shifts, and the place may be off as well."""
 AGREED_PX = 2.5
 """Largest difference between the offsets of two neighbours on one line."""
-ROLLS_RAD = (-0.03, 0.0, 0.03)
-"""Turns about the middle that are tried with each shift."""
 
 
 @dataclass(frozen=True)
@@ -57,10 +51,12 @@ def look_for_lines(picture: Frame, lines: VisibleLines, reach_px: float) -> Line
 
 def _match(streaks: Streaks, lines: VisibleLines, at: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Find the strongest streak along the normal of each line, near `at` (N, 2): offset, contrast, True for a line."""
-    steps = np.arange(-NEAR_PX, NEAR_PX + 1)
+    # Largest distance of a line from the common shift: a turn bends what it shifts, and the place may be off as well.
+    near_px = 12
+    steps = np.arange(-near_px, near_px + 1)
     near, *beside = (
         streaks.read(lines, at[:, None] + (steps + aside)[:, None] * lines.normal[:, None])
-        for aside in (0, -2 * NEAR_PX - 1, 2 * NEAR_PX + 1)
+        for aside in (0, -2 * near_px - 1, 2 * near_px + 1)
     )
     best = near.argmax(axis=1)
     contrast = near[np.arange(len(near)), best]
@@ -104,20 +100,24 @@ def _agreeing(offset: NDArray[np.intp], lines: VisibleLines) -> NDArray[np.bool_
 
 def _common_shift(streaks: Streaks, lines: VisibleLines, reach_px: float) -> Array:
     """Return the shift (N, 2) at which most lines lie on streaks: the same for all but for a turn about the middle."""
-    steps = COARSE_PX * np.arange(-int(reach_px // COARSE_PX), int(reach_px // COARSE_PX) + 1)
+    # Step between the shifts that are tried; streaks are widened by as much.
+    coarse_px = 6
+    steps = coarse_px * np.arange(-int(reach_px // coarse_px), int(reach_px // coarse_px) + 1)
     shifts = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
-    wide = streaks.widened(COARSE_PX)
+    wide = streaks.widened(coarse_px)
     # Most places on lines that are used to find the shift.
     few = lines[np.linspace(0, len(lines) - 1, min(120, len(lines))).astype(np.intp)]
     # Of two shifts that are as good, the nearer one is taken.
     far = 0.05 * np.hypot(*shifts.T) / max(reach_px, 1.0)
     scores = []
-    for roll in ROLLS_RAD:
+    # Turns about the middle that are tried with each shift.
+    rolls_rad = (-0.03, 0.0, 0.03)
+    for roll in rolls_rad:
         evidence = wide.read(few, (few.pixel + _turned(few.pixel, lines.pixel, roll))[:, None] + shifts)
         # A streak of this contrast is half a line.
         scores.append((evidence / (evidence + 10.0)).mean(axis=0) - far)
     roll, best = divmod(int(np.argmax(scores)), len(shifts))
-    return shifts[best] + _turned(lines.pixel, lines.pixel, ROLLS_RAD[roll])
+    return shifts[best] + _turned(lines.pixel, lines.pixel, rolls_rad[roll])
 
 
 def _turned(pixel: Array, of: Array, angle: float) -> Array:

@@ -16,13 +16,8 @@ from numpy.typing import NDArray
 from worker.calibration.detection.segmentation import Region
 from worker.calibration.geometry.camera import Array, Frame
 
-MOST_COLOURS = 8
-"""Number of clusters into which the colours that stand out are sorted. Halls have up to six paints; one that shines, or
-that another line touches, has two."""
 SPREAD_RAD = 0.2
 """Spread of the colours of one paint, as an angle between differences: white and yellow on blue are 0.26 apart."""
-FAINTEST = 0.15
-"""The share of a paint below which a pixel shows none: noise, and edges of other lines."""
 ROWS = 256
 """Rows of a frame that are processed at once: a frame of 4K would take 400 MB as numbers."""
 
@@ -33,14 +28,17 @@ def sort_colours(frames: Sequence[Frame], regions: Sequence[Sequence[Region]]) -
     They are read off frames (H, W, 3) where `regions` of each can show lines.
     """
     seen = np.concatenate([_colours_of_lines(frame, its) for frame, its in zip(frames, regions, strict=True)])
-    if len(seen) < MOST_COLOURS:
+    # Number of clusters into which the colours that stand out are sorted. Halls have up to six paints; one that shines,
+    # or that another line touches, has two.
+    most_colours = 8
+    if len(seen) < most_colours:
         return np.empty((0, 3))
     hues = seen / np.linalg.norm(seen, axis=1, keepdims=True)
     cv2.setRNGSeed(0)
     criteria = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 50, 1e-4)
-    labels = cv2.kmeans(hues, MOST_COLOURS, np.empty(0), criteria, 3, cv2.KMEANS_PP_CENTERS)[1][:, 0]
+    labels = cv2.kmeans(hues, most_colours, np.empty(0), criteria, 3, cv2.KMEANS_PP_CENTERS)[1][:, 0]
     colours: list[Array] = []
-    for group in sorted((seen[labels == label] for label in range(MOST_COLOURS)), key=len, reverse=True):
+    for group in sorted((seen[labels == label] for label in range(most_colours)), key=len, reverse=True):
         colour = np.median(group, axis=0)
         # Clusters cut a paint in two where it is most of all that is seen.
         # Clusters of noise are smaller.
@@ -59,6 +57,8 @@ def draw_colours(frame: Frame, colours: Array, chosen: Sequence[int]) -> Frame:
     sizes = np.linalg.norm(colours, axis=1)
     directions = (colours / sizes[:, None]).T.astype(np.float32)
     drawn = np.empty_like(frame)
+    # The share of a paint below which a pixel shows none: noise, and edges of other lines.
+    faintest = 0.15
     for rows, difference in _differences(frame):
         along = difference @ directions
         size = np.linalg.norm(difference, axis=-1, keepdims=True)
@@ -68,7 +68,7 @@ def draw_colours(frame: Frame, colours: Array, chosen: Sequence[int]) -> Frame:
         belongs = likelihood / np.maximum(likelihood.sum(axis=-1, keepdims=True), np.exp(-0.5 * 2.0**2))
         share = np.clip(along / sizes.astype(np.float32), 0.0, 1.0)
         shown = (belongs * share)[..., list(chosen)].sum(axis=-1)
-        shown = np.clip((shown - FAINTEST) / (1 - FAINTEST), 0.0, 1.0)
+        shown = np.clip((shown - faintest) / (1 - faintest), 0.0, 1.0)
         # Grey levels of the ground, and by how much paint is brighter.
         drawn[rows] = (60.0 + 140.0 * shown)[..., None]
     return drawn

@@ -14,16 +14,13 @@ from worker.calibration.detection.contrast import BLUE, GREEN, RED, Channels
 from worker.calibration.detection.streaks import DIRECTIONS, LEAST_CONTRAST, LEVELS, Streaks, level_of
 from worker.calibration.geometry.visibility import VisibleLines
 
-WORKING_PX = 960
-"""Columns of the reduced picture in which streaks are looked for."""
-MASK_PX = 8
-"""Side of the squares of the mask of where lines can be."""
-
 
 def ridge_response(channels: Channels, lines: VisibleLines, reach_px: float) -> NDArray[np.float32]:
     """Return a response (H, W) in 0..1: how much each pixel looks like one of `lines` at most `reach_px` away."""
     height, width = channels[GREEN].shape
-    size = (min(WORKING_PX, width), max(1, round(height * min(1.0, WORKING_PX / width))))
+    # Columns of the reduced picture in which streaks are looked for.
+    working_px = 960
+    size = (min(working_px, width), max(1, round(height * min(1.0, working_px / width))))
     scale = size[0] / width
     reduced = [cv2.resize(channels[channel], size, interpolation=cv2.INTER_AREA) for channel in (BLUE, GREEN, RED)]
     streaks = Streaks.of(np.rint(np.dstack(reduced)).astype(np.uint8))
@@ -54,11 +51,13 @@ def _likelihood(strength: NDArray[np.uint8], level: int) -> NDArray[np.float32]:
 
 def _within(pixels: NDArray[np.float64], reach_px: float, size: tuple[int, int]) -> NDArray[np.float32]:
     """Return 1 (H, W) where any of the pixels (N, 2) is at most about `reach_px` away, 0 elsewhere."""
-    coarse = np.zeros((-(-size[1] // MASK_PX), -(-size[0] // MASK_PX)), dtype=np.uint8)
-    column, row = np.clip((pixels / MASK_PX).astype(int).T, 0, [[coarse.shape[1] - 1], [coarse.shape[0] - 1]])
+    # Side of the squares of the mask of where lines can be.
+    mask_px = 8
+    coarse = np.zeros((-(-size[1] // mask_px), -(-size[0] // mask_px)), dtype=np.uint8)
+    column, row = np.clip((pixels / mask_px).astype(int).T, 0, [[coarse.shape[1] - 1], [coarse.shape[0] - 1]])
     coarse[row, column] = 1
-    reach = max(1, round(reach_px / MASK_PX))
+    reach = max(1, round(reach_px / mask_px))
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1,) * 2)
     coarse = np.asarray(cv2.dilate(coarse, disc), dtype=np.uint8)
-    near = np.repeat(np.repeat(coarse, MASK_PX, axis=0), MASK_PX, axis=1)[: size[1], : size[0]]
+    near = np.repeat(np.repeat(coarse, mask_px, axis=0), mask_px, axis=1)[: size[1], : size[0]]
     return near.astype(np.float32)

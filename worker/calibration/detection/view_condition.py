@@ -36,8 +36,6 @@ CELLS = 40
 FEWEST_PLACES, FEWEST_CELLS = 20, 12
 """Fewest places on lines, and fewest cells of the field, for a judgement."""
 
-NOISE_ROWS = 16
-"""Step between the rows of the frame in which the noise is measured."""
 
 LEAST_SPOILED = 0.2
 """Share of the visible field below which dark, fog or snow leave a view usable."""
@@ -279,7 +277,7 @@ def _lost(sight: LinesInSight, ground: _Ground) -> Mask:
 
 def _noise(frame: Frame, field: Mask) -> float:
     """Return the standard deviation of a pixel in the field, from second differences of neighbours."""
-    rows = frame[::NOISE_ROWS, :, 1].astype(np.int16)
+    rows = frame[::16, :, 1].astype(np.int16)
     bend = np.abs(2 * rows[:, 1:-1] - rows[:, :-2] - rows[:, 2:])
     inside = _enlarged(field, bend.shape)
     # The median of |x| is 0.67 standard deviations, and of x - (y + z) / 2, doubled, the root of 6 of them.

@@ -14,8 +14,6 @@ from worker.calibration.geometry.camera import Array, Camera
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.visibility import VisibleLines
 
-AROUND_PITCH_M = 1.0
-
 
 @dataclass(frozen=True)
 class Overlap:
@@ -70,18 +68,19 @@ def _rounded(pixels: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
 
 
 def _pitch_area(pitch: Field, camera: Camera) -> NDArray[np.uint8]:
-    """Return 1 inside the field and `AROUND_PITCH_M` around it, at a sixteenth of the picture's detail."""
+    """Return 1 inside the field and a metre around it, at a sixteenth of the picture's detail."""
     coarse = camera.intrinsics.scaled(1 / 16)
     width, height = coarse.size
     x, y = np.meshgrid(np.arange(width), np.arange(height))
     rays = Camera(camera.id, coarse, camera.pose).rays(np.stack([x, y], axis=-1))
+    around_pitch_m = 1.0
     with np.errstate(divide="ignore", invalid="ignore"):
         distance = -camera.pose.position[2] / rays[..., 2]
         ground = camera.pose.position[:2] + distance[..., None] * rays[..., :2]
         on_pitch = (
             (distance > 0)
-            & (np.abs(ground[..., 0]) < pitch.length / 2 + AROUND_PITCH_M)
-            & (np.abs(ground[..., 1]) < pitch.width / 2 + AROUND_PITCH_M)
+            & (np.abs(ground[..., 0]) < pitch.length / 2 + around_pitch_m)
+            & (np.abs(ground[..., 1]) < pitch.width / 2 + around_pitch_m)
         )
     full = cv2.resize(on_pitch.astype(np.uint8), camera.intrinsics.size, interpolation=cv2.INTER_NEAREST)
     return np.asarray(full, dtype=np.uint8)

@@ -31,8 +31,6 @@ Segmented = tuple[Camera, Response]
 PIXEL_M = 0.1
 
 COARSE_STEP_M, COARSE_HALF_M = 0.2, 18.0
-# Largest displacement of two views that is found.
-REACH_M = 8.0
 # Displacement below which two views are near each other.
 NEAR_M = 0.5
 
@@ -272,7 +270,9 @@ def _coarse_shift(first: BirdsEye, second: BirdsEye, line_width: float) -> Array
     correlation."""
     a_seen, b_seen = first[1], second[1]
     a, b = (_smooth(view, 0.4, COARSE_STEP_M, line_width) * view[1] for view in (first, second))
-    reach = round(REACH_M / COARSE_STEP_M)
+    # Largest displacement of two views that is found.
+    reach_m = 8.0
+    reach = round(reach_m / COARSE_STEP_M)
     # Over what both see at each shift (masked normalised correlation after Padfield, 2012).
     plane = cv2.getOptimalDFTSize(2 * a.shape[0])
     fa, fb, fa2, fb2, fas, fbs = (np.fft.rfft2(p, (plane, plane)) for p in (a, b, a * a, b * b, a_seen, b_seen))
@@ -293,7 +293,7 @@ def _coarse_shift(first: BirdsEye, second: BirdsEye, line_width: float) -> Array
     correlation = covariance[judged] / np.sqrt(var_a[judged] * var_b[judged])
     shifts = ground_grid(reach, reach, COARSE_STEP_M)[judged]
     # Among shifts that explain the views alike (along a lone halfway line) the smallest is taken.
-    best = np.argmax(correlation - 0.05 * np.linalg.norm(shifts, axis=1) / REACH_M)
+    best = np.argmax(correlation - 0.05 * np.linalg.norm(shifts, axis=1) / reach_m)
     return np.asarray(shifts[best])
 
 

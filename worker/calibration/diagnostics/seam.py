@@ -16,8 +16,6 @@ from worker.calibration.geometry.camera import Array, Camera
 from worker.calibration.geometry.field import Field, LinePoints
 from worker.calibration.refinement.uncertainty import RefinedPose
 
-MOST_PLACES = 24
-
 
 @dataclass(frozen=True)
 class SeamPlace:
@@ -58,11 +56,12 @@ def measure_seam(pitch: Field, first: RefinedPose, second: RefinedPose) -> Seam:
     # Largest sigma of a line that is compared.
     known = np.isfinite(apart) & (sigma < 0.2)
     index, apart, sigma = index[known], apart[known], sigma[known]
+    most_places = 24
     # Line points (25 cm apart) that make a place of the curve: the fewest with which it has not too many.
     for points in (20, 40, 80, 160):
         piece = np.stack([lines.marking[index], index // points], axis=1)
         pieces, which, count = np.unique(piece, axis=0, return_inverse=True, return_counts=True)
-        if len(pieces) <= MOST_PLACES:
+        if len(pieces) <= most_places:
             break
     which = which.ravel()
     places = []
@@ -73,7 +72,7 @@ def measure_seam(pitch: Field, first: RefinedPose, second: RefinedPose) -> Seam:
         across = np.sign(error or 1.0) * normal / np.linalg.norm(normal)
         at = lines.position[index[its], :2].mean(axis=0)
         places.append(SeamPlace(at, across, abs(error), float(np.median(sigma[its]))))
-    return Seam(_in_order(places[:MOST_PLACES]))
+    return Seam(_in_order(places[:most_places]))
 
 
 def paint_offsets(lines: LinePoints, camera: Camera, measured: Measurements) -> tuple[Array, Array]:

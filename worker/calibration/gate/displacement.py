@@ -18,9 +18,6 @@ from worker.calibration.geometry.far_marking import on_the_ground
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.parameters import with_focal_length
 
-FOCAL_STEP = 1e-4
-"""Relative step of a focal length for its numerical derivative."""
-
 
 @dataclass(frozen=True)
 class RelativeFocalLength:
@@ -122,7 +119,8 @@ def relative_focal_length(anchor: Camera, found: CameraResult) -> RelativeFocalL
 
 
 def _focal_shift_m(camera: Camera, place: Array) -> float:
-    longer = with_focal_length(camera, FOCAL_STEP * camera.intrinsics.focal_length_px)
+    focal_step = 1e-4
+    longer = with_focal_length(camera, focal_step * camera.intrinsics.focal_length_px)
     shifted = ground_point(longer, camera.project(place), place[2])
-    shift_m = float(np.linalg.norm(shifted - place)) / FOCAL_STEP
+    shift_m = float(np.linalg.norm(shifted - place)) / focal_step
     return shift_m if np.isfinite(shift_m) else 0.0

@@ -16,8 +16,6 @@ from numpy.typing import NDArray
 from worker.calibration.geometry.camera import Array
 from worker.calibration.geometry.field import LinePoints
 
-NODE_M = 7.0
-
 
 @dataclass(frozen=True)
 class Belief:
@@ -44,14 +42,15 @@ class Ground:
     @classmethod
     def under(cls, lines: LinePoints) -> Ground:
         """Return the ground under line points."""
-        at = lines.position[:, :2] / NODE_M
+        node_m = 7.0
+        at = lines.position[:, :2] / node_m
         low = np.floor(at).astype(int)
         right, up = (at - low).T
         corners = np.stack([low, low + [1, 0], low + [0, 1], low + [1, 1]], axis=1)
         share = np.stack([(1 - right) * (1 - up), right * (1 - up), (1 - right) * up, right * up], axis=1)
         nodes, node = np.unique(corners.reshape(-1, 2), axis=0, return_inverse=True)
         # Heights correlate over 10 m.
-        apart = np.sqrt(3) * NODE_M * np.linalg.norm(nodes[:, None] - nodes[None], axis=-1) / 10.0
+        apart = np.sqrt(3) * node_m * np.linalg.norm(nodes[:, None] - nodes[None], axis=-1) / 10.0
         covariance = (1 + apart) * np.exp(-apart) + 1e-6 * np.eye(len(nodes))
         return cls(node.reshape(-1, 4), share, np.linalg.inv(covariance), lines.uneven_m)
 

@@ -13,7 +13,6 @@ from worker.calibration.geometry.camera import Array, Camera
 from worker.calibration.geometry.field import Field, LinePoints
 from worker.calibration.geometry.lens import LENS_PARAMETERS, Lens
 
-FIELD_STEP_M = 1e-3
 BOARD_FOCAL, BOARD_ASPECT, BOARD_RADIAL = 3e-4, 2e-4, 5e-4
 """Sigma after photos of a good board: of the focal length as a part of it, of the ratio of the two, of k1 and k2; and
 of the principal point a pixel of a 4K frame."""
@@ -22,11 +21,6 @@ HEAT_FOCAL = 3e-4
 kelvin, and summer noon and a winter's night are 13 K to either side of the mean."""
 FREE_RIDGE_M = 0.3
 """Prior sigma of a free ridge: a crown of up to half a metre."""
-FREE_BEND = 0.05
-"""Prior sigma of k1 and k2, at half the width of the frame, of a lens that is found with a pose."""
-TAPE = 3e-4
-"""Prior sigma of length, width and diagonal, part of each: a tape that is pulled with care. It comes from the 3 cm that
-were taken for a football pitch of 105 m; no bench has chosen it."""
 
 
 @dataclass(frozen=True)
@@ -86,11 +80,12 @@ class FieldMeasure(FieldParameter):
         return list(cameras), self.write(pitch, self.read(pitch) + by)
 
     def _shift_of(self, pitch: Field, lines: LinePoints) -> Array:
+        field_step_m = 1e-3
         ahead, behind = (
             self.write(pitch, self.read(pitch) + step).same_line_points(lines).position
-            for step in (FIELD_STEP_M, -FIELD_STEP_M)
+            for step in (field_step_m, -field_step_m)
         )
-        return np.asarray((ahead - behind) / (2 * FIELD_STEP_M), dtype=float)
+        return np.asarray((ahead - behind) / (2 * field_step_m), dtype=float)
 
 
 @dataclass(frozen=True)
@@ -172,24 +167,29 @@ def free_lens_sigma(lens: Lens) -> dict[str, float]:
     half_width = lens.size[0] / (2 * lens.focal_length_px)
     # Twenty pixels of a 4K frame.
     centre = 20 / 3840 * lens.size[0]
+    # Prior sigma of k1 and k2, at half the width of the frame, of a lens that is found with a pose.
+    free_bend = 0.05
     # Relative sigma of the focal length.
     return {
         "fx": 0.1 * lens.focal_length_px,
         "cx": centre,
         "cy": centre,
-        "k1": FREE_BEND * half_width**-2,
-        "k2": FREE_BEND * half_width**-4,
+        "k1": free_bend * half_width**-2,
+        "k2": free_bend * half_width**-4,
     }
 
 
 def careful_measurement(pitch: Field) -> dict[str, float]:
     """Return the sigma (m) of a field measured with care, by parameter; diagonals give the right angles."""
+    # Prior sigma of length, width and diagonal, part of each: a tape that is pulled with care. It comes from the 3 cm
+    # that were taken for a football pitch of 105 m; no bench has chosen it.
+    tape = 3e-4
     # A level over half a field; no bench has chosen it.
     return {
         "ridge_height_m": 0.02,
-        "length_m": TAPE * pitch.length,
-        "width_m": TAPE * pitch.width,
-        "skew_m": TAPE * hypot(pitch.length, pitch.width),
+        "length_m": tape * pitch.length,
+        "width_m": tape * pitch.width,
+        "skew_m": tape * hypot(pitch.length, pitch.width),
     }
 
 

@@ -11,8 +11,6 @@ from worker.calibration.geometry.arrays import Array, take_rows
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.field import LinePoints
 
-STEP_M = 0.05
-
 
 @dataclass(frozen=True)
 class VisibleLines:
@@ -40,9 +38,10 @@ class VisibleLines:
         pixel = camera.project(lines.position)
         index = np.flatnonzero(camera.sees(pixel))
         lines, pixel = lines[index], pixel[index]
-        along = (camera.project(lines.position + STEP_M * lines.tangent) - pixel) / STEP_M
-        across = (camera.project(lines.position + STEP_M * lines.normal) - pixel) / STEP_M
-        up = (camera.project(lines.position + [0.0, 0.0, STEP_M]) - pixel) / STEP_M
+        step_m = 0.05
+        along = (camera.project(lines.position + step_m * lines.tangent) - pixel) / step_m
+        across = (camera.project(lines.position + step_m * lines.normal) - pixel) / step_m
+        up = (camera.project(lines.position + [0.0, 0.0, step_m]) - pixel) / step_m
         speed = np.linalg.norm(along, axis=1)
         # A line seen end-on has no direction in the picture, and a point at the rim of the lens none that is known.
         usable = np.isfinite(across + up).all(axis=1) & np.isfinite(speed) & (speed > 1e-6)

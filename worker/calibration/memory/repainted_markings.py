@@ -23,8 +23,6 @@ from worker.calibration.memory.camera_memory import WIND, CameraMemory
 from worker.calibration.memory.epoch import SAME_VIEW_PX, Epoch
 from worker.calibration.robust import HUBER, robust_scale
 
-TINY = 1e-12
-
 
 def find_repainted_markings(memory: CameraMemory, measured: Measurements, lines: LinePoints) -> NDArray[np.intp]:
     """Return the markings whose paint lies elsewhere than in the first nights, where the lines are `measured` tonight.
@@ -117,7 +115,8 @@ class _Differences:
         minimises it."""
         jacobian = np.concatenate([self.jacobian, *columns], axis=1) / sigma_px
         known = np.eye(POSE_NUMBERS, jacobian.shape[1]) / WIND[:, None]
-        scale = np.maximum(np.linalg.norm(jacobian, axis=0), TINY)
+        tiny = 1e-12
+        scale = np.maximum(np.linalg.norm(jacobian, axis=0), tiny)
         offset, weight = self.offset / sigma_px, np.ones(len(self.offset))
         change = np.zeros(jacobian.shape[1])
         for _ in range(4):
@@ -125,6 +124,6 @@ class _Differences:
             rows = np.concatenate([jacobian * root[:, None], known]) / scale
             change = np.linalg.lstsq(rows, np.append(-offset * root, np.zeros(POSE_NUMBERS)), rcond=1e-9)[0] / scale
             residual = np.abs(offset + jacobian @ change)
-            weight = np.minimum(1.0, HUBER / np.maximum(residual, TINY))
+            weight = np.minimum(1.0, HUBER / np.maximum(residual, tiny))
         loss = np.sum(weight * (2 - weight) * residual**2) + np.sum((known @ change) ** 2)
         return float(loss) / 2, change

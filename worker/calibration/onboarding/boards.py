@@ -13,8 +13,6 @@ from worker.calibration.geometry.camera import Array
 
 Grey = NDArray[np.uint8]
 
-REFINE_WINDOW_PX = 11
-
 
 @dataclass(frozen=True)
 class Charuco:
@@ -98,7 +96,7 @@ def _by_its_quadrangles(photo: Grey, size: tuple[int, int]) -> NDArray[np.float3
     if not found:
         return None
     full = ((corners + 0.5) / scale - 0.5).astype(np.float32)
-    window = (REFINE_WINDOW_PX, REFINE_WINDOW_PX)
+    window = (11, 11)
     criteria = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_COUNT, 40, 1e-3)
     return np.asarray(cv2.cornerSubPix(photo, full, window, (-1, -1), criteria), dtype=np.float32)
 

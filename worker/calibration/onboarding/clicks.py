@@ -12,8 +12,6 @@ from worker.calibration.geometry.camera import Array, inside
 from worker.calibration.geometry.lens import Lens
 
 FEWEST_CLICKS = 4
-COLLINEAR = 0.01
-"""Ratio of width to length of a set of points below which they are a line."""
 
 
 @dataclass(frozen=True)
@@ -95,9 +93,11 @@ def require_more_than_a_line(clicks: Clicks) -> None:
 
 
 def _line(clicks: Clicks) -> _Line | None:
-    if _flatness(clicks.world) < COLLINEAR:
+    # Ratio of width to length of a set of points below which they are a line.
+    collinear = 0.01
+    if _flatness(clicks.world) < collinear:
         return _Line("points", "lie on one line, around which the camera could turn", "add points off that line")
-    if _flatness(clicks.pixel) < COLLINEAR:
+    if _flatness(clicks.pixel) < collinear:
         return _Line("clicks", "lie on one line of the picture", "add points nearer to and farther from the camera")
     return None
 

@@ -23,7 +23,6 @@ LENS_LADDER: tuple[tuple[str, ...], ...] = (
 )
 FEWEST_SPARE = 6
 """Fewest coordinates beyond the parameters of a fit with which its lens is freed."""
-FOLDS = 10
 OF_THE_MATRIX = ("fx", "fy", "aspect", "cx", "cy")
 
 
@@ -84,8 +83,9 @@ def left_out_px(found: PointFit) -> float:
     """Return the rms of believed clicks, each against a fit to the others."""
     believed = found.clicks[~found.doubted]
     squared = []
-    for number in range(min(FOLDS, len(believed))):
-        out = np.arange(len(believed)) % min(FOLDS, len(believed)) == number
+    folds = 10
+    for number in range(min(folds, len(believed))):
+        out = np.arange(len(believed)) % min(folds, len(believed)) == number
         without = refit(found, believed[~out])
         off = without.camera.project(believed.world[out]) - believed.pixel[out]
         squared.append(np.sum(off**2, axis=1))

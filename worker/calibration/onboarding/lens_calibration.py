@@ -35,8 +35,6 @@ FEWEST_PHOTOS = 4
 ROUNDS = 4
 CELLS = (8, 5)
 """Columns and rows of the picture in which corners are counted."""
-UNSURE = 0.01
-"""Largest sigma for a field, as a part of the focal length, or of the picture's width for the centre."""
 ZONES = (("top left", "top", "top right"), ("left", "middle", "right"), ("bottom left", "bottom", "bottom right"))
 
 Fate = Literal["used", "no-board", "wrong-size", "hurts"]
@@ -372,9 +370,11 @@ def _warnings(
     worst = _worse(sigma, spread)
     focal = max(worst.get(name, 0.0) for name in ("f", "fx", "fy"))
     centre = max(worst.get(name, 0.0) for name in ("cx", "cy"))
-    if focal > UNSURE * lens.matrix[0, 0]:
+    # Largest sigma for a field, as a part of the focal length, or of the picture's width for the centre.
+    largest_sigma = 0.01
+    if focal > largest_sigma * lens.matrix[0, 0]:
         found.append(f"the focal length is sure to {focal:.0f} px only: tilt the board more, both ways")
-    if centre > UNSURE * lens.size[0]:
+    if centre > largest_sigma * lens.size[0]:
         found.append(f"the principal point is sure to {centre:.0f} px only: add photos all over the picture")
     if "cx" not in sigma:
         found.append("the photos do not fix the principal point: it was left in the middle of the picture")

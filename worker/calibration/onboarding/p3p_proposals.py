@@ -16,8 +16,6 @@ from worker.calibration.onboarding.clicks import Clicks
 from worker.calibration.onboarding.exchanged_labels import best_exchanges
 
 TRIPLES = 400
-BEGUN_FROM = 6
-"""Number of proposed poses that are fitted to the end."""
 
 
 def propose_poses(clicks: Clicks, lens: Lens) -> tuple[Array, Array]:
@@ -72,8 +70,10 @@ def most_promising_poses(clicks: Clicks, lens: Lens, rotations: Array, positions
         return []
     pixels = project(clicks.world, rotations, positions, lens)
     explained = np.argsort(_soft_costs(np.sum((pixels - clicks.pixel) ** 2, axis=2), lens).sum(axis=1), kind="stable")
+    # Number of proposed poses that are fitted to the end.
+    begun_from = 6
     # Most pairs of clicks times poses for which exchanged labels are tried at once.
-    first = explained[: max(BEGUN_FROM, 4_000_000 // len(clicks) ** 2)]
+    first = explained[: max(begun_from, 4_000_000 // len(clicks) ** 2)]
     # [p, i, j]: click i for the point of click j.
     costs = _soft_costs(np.sum((pixels[first, None] - clicks.pixel[:, None]) ** 2, axis=3), lens)
     pairs, spared = best_exchanges(costs)
@@ -84,7 +84,7 @@ def most_promising_poses(clicks: Clicks, lens: Lens, rotations: Array, positions
         if any(is_same_pose(pose, other) for other, _ in chosen):
             continue
         chosen.append((pose, clicks.swapped(*pairs[number].tolist()) if spared[number] > 0 else clicks))
-        if len(chosen) == BEGUN_FROM:
+        if len(chosen) == begun_from:
             break
     return chosen
 

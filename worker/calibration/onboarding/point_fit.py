@@ -21,8 +21,6 @@ from worker.calibration.onboarding.clicks import Clicks
 
 CLICK_PX = 2.0
 """Standard deviation of a click, in pixels of a 4K frame."""
-CLICK_EVIDENCE = 4.0
-"""Weight of `CLICK_PX` in the estimate of a click's deviation, in coordinates."""
 FREE_PARAMETERS = {
     "focal length": "focal_length_px",
     "centre x": "principal_point_x_px",
@@ -197,7 +195,9 @@ class _Problem:
         squared = float(np.nansum(believed[:, None] * self.off(camera) ** 2))
         numbers = max(2 * float(believed.sum()) - POSE_NUMBERS - len(self.index), 0.0)
         expected = (CLICK_PX * self.lens.relative_size) ** 2
-        return float(np.sqrt((CLICK_EVIDENCE * expected + squared) / (CLICK_EVIDENCE + numbers)))
+        # Weight of `CLICK_PX` in the estimate of a click's deviation, in coordinates.
+        click_evidence = 4.0
+        return float(np.sqrt((click_evidence * expected + squared) / (click_evidence + numbers)))
 
     def _moved(self, camera: Camera, change: Array, move: Array) -> tuple[Camera, Array]:
         then = change + move[POSE_NUMBERS:]

@@ -33,13 +33,6 @@ from worker.calibration.geometry.rotation import rotation_matrices
 PIXELS_PER_METRE = 10.0
 COARSEST = 32
 """Side, in pixels, of the square that may be one pixel on the coarsest grid."""
-REACH_PX = 8
-"""Distance from a blurred line of the template up to which a union reaches, in pixels of the grid of that blur."""
-LINE_SAMPLES = 6
-"""Number of samples of the drawn template across a line."""
-MARGIN_M = 2.0
-LARGEST_UNDISTORTED = 2.5
-"""Largest width of undistorted frames, in widths of the frame; wider ones are cut."""
 
 Picture = NDArray[np.uint8]
 """Grey picture, or a mask that is 0 where it is not."""
@@ -161,7 +154,9 @@ def _coarsened(domain: Picture, count: int) -> list[Picture]:
 
 def _widened(template: Sequence[Picture]) -> list[Picture]:
     """Return a template's blurred lines and what is beside them."""
-    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * REACH_PX + 1, 2 * REACH_PX + 1))
+    # Distance from a blurred line of the template up to which a union reaches, in pixels of the grid of that blur.
+    reach_px = 8
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach_px + 1, 2 * reach_px + 1))
     return [np.asarray(cv2.dilate(lines, disc), dtype=np.uint8) for lines in template]
 
 
@@ -198,8 +193,10 @@ class _PinholeView:
             ]
         )
         rays = lens.undistort(border)
-        left_top = np.maximum(np.nanmin(rays, axis=0) * lens.matrix[0, 0], [-LARGEST_UNDISTORTED * width / 2] * 2)
-        right_bottom = np.minimum(np.nanmax(rays, axis=0) * lens.matrix[0, 0], [LARGEST_UNDISTORTED * width / 2] * 2)
+        # Largest width of undistorted frames, in widths of the frame; wider ones are cut.
+        largest_undistorted = 2.5
+        left_top = np.maximum(np.nanmin(rays, axis=0) * lens.matrix[0, 0], [-largest_undistorted * width / 2] * 2)
+        right_bottom = np.minimum(np.nanmax(rays, axis=0) * lens.matrix[0, 0], [largest_undistorted * width / 2] * 2)
         matrix = np.array([[lens.matrix[0, 0], 0, -left_top[0]], [0, lens.matrix[0, 0], -left_top[1]], [0, 0, 1]])
         size = np.ceil(right_bottom - left_top).astype(int) + 1
         x, y = np.meshgrid(np.arange(size[0]), np.arange(size[1]))
@@ -224,7 +221,8 @@ class _Grid:
 
     @classmethod
     def covering(cls, pitch: Field) -> _Grid:
-        origin = -np.array([pitch.length / 2 + MARGIN_M, pitch.width / 2 + MARGIN_M])
+        margin_m = 2.0
+        origin = -np.array([pitch.length / 2 + margin_m, pitch.width / 2 + margin_m])
         size = tuple(COARSEST * ceil(-2 * side * PIXELS_PER_METRE / COARSEST) for side in origin)
         columns, rows = np.meshgrid(np.arange(size[0]), np.arange(size[1]))
         surface = pitch.lift(origin + np.stack([columns, rows], axis=-1) / PIXELS_PER_METRE)
@@ -250,9 +248,10 @@ class _Grid:
     def lines(self, pitch: Field) -> Picture:
         """Return white lines on black (H, W); a pixel that a line covers in part is grey."""
         points = pitch.line_points(0.02)
-        across = (np.arange(LINE_SAMPLES) + 0.5) / LINE_SAMPLES - 0.5
+        line_samples = 6
+        across = (np.arange(line_samples) + 0.5) / line_samples - 0.5
         covered = points.position[:, :2] + (across[:, None] * points.width)[..., None] * points.normal[:, :2]
-        area = np.broadcast_to(points.spacing * points.width / LINE_SAMPLES, covered.shape[:2])
+        area = np.broadcast_to(points.spacing * points.width / line_samples, covered.shape[:2])
         edges = [np.arange(side + 1) - 0.5 for side in self.size[::-1]]
         column, row = ((covered - self.origin) * PIXELS_PER_METRE).reshape(-1, 2).T
         share = PIXELS_PER_METRE**2 * np.histogram2d(row, column, edges, weights=area.ravel())[0]

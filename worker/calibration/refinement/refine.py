@@ -35,8 +35,6 @@ SEARCH_PX = (14.0, 8.0, 5.0)
 EVALUATION_SEARCH_PX = 8.0
 MOST_STEPS = 4
 """Most steps of a coarse round."""
-PATIENCE = 3
-"""Steps no shorter than one before after which the last steps end."""
 NOT_LOOKED_AT: NDArray[np.float32] = np.zeros((1, 1), dtype=np.float32)
 """Response to a frame that the network was not run on: a marking nowhere."""
 
@@ -202,6 +200,7 @@ class _Refiner:
     def follow(self, estimate: Estimate) -> GaussNewtonStep:
         """Return the last of the steps to the lines as the frames have been read."""
         mixed, lengths = MixedSteps(self.unknowns), list[float]()
+        patience = 3
         for _ in range(12):
             # Half width of the search in the last rounds, which go on until the cameras stand still. Wide enough that
             # it is the robust weights which leave out a line point, and not the end of the search, which moves with the
@@ -211,8 +210,8 @@ class _Refiner:
             # They end when cameras move less than this, or than such a part of the first step on the same reading, or
             # when so many steps were no shorter than one before: a line point that fits two shifts alike may go to and
             # fro.
-            if lengths[-1] < max(5e-5, 0.1 * lengths[0]) or min(lengths[-PATIENCE:]) > min(
-                lengths[:-PATIENCE], default=np.inf
+            if lengths[-1] < max(5e-5, 0.1 * lengths[0]) or min(lengths[-patience:]) > min(
+                lengths[:-patience], default=np.inf
             ):
                 break
             estimate = mixed.step(estimate, last)

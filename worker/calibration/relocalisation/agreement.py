@@ -10,7 +10,6 @@ from worker.calibration.relocalisation.field_map import FieldMap
 from worker.calibration.relocalisation.hypotheses import Hypotheses
 from worker.calibration.relocalisation.line_view import WIDTH_PX, LineView
 
-AT_ONCE = 1024
 NEAREST_M = 0.3
 HALF_WIDTH_PX = WIDTH_PX / 2
 LOWEST_M = 1.2
@@ -23,9 +22,10 @@ def agreement(field: FieldMap, view: LineView, cameras: Hypotheses, tolerance_px
     Dice's coefficient in view pixels: line that is expected and painted, and paint that is expected, out of both; a
     distance of `tolerance_px` counts for 1/e.
     """
+    at_once = 1024
     parts = [
-        _agreement(field, view, cameras[start : start + AT_ONCE], tolerance_px)
-        for start in range(0, len(cameras), AT_ONCE)
+        _agreement(field, view, cameras[start : start + at_once], tolerance_px)
+        for start in range(0, len(cameras), at_once)
     ]
     return np.concatenate(parts) if parts else np.zeros(0)
 

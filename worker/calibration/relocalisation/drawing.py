@@ -8,7 +8,7 @@ from worker.calibration.geometry.camera import Array
 from worker.calibration.relocalisation.field_map import FieldMap
 from worker.calibration.relocalisation.hypotheses import Hypotheses, rotations_of
 
-NEAREST_M, LOWEST_M, HIGHEST_M = 0.5, 2.0, 35.0
+LOWEST_M, HIGHEST_M = 2.0, 35.0
 BESIDE, AIMED_AT = 1.3, 1.1
 """Range of cameras along a side, and of the places they aim at, in half sizes of the field."""
 
@@ -20,9 +20,10 @@ def draw(field: FieldMap, focal_px: Array, roll_sigma: float, count: int, rng: n
     """
     half_x, half_y = field.half_size.tolist()
     behind_an_end = rng.integers(0, 3, count) == 2
+    nearest_m = 0.5
     # A larger field is filmed from as far as it is large.
-    beside = half_y + _log_uniform(NEAREST_M, max(60.0, half_y), count, rng)
-    behind = half_x + _log_uniform(NEAREST_M, max(40.0, half_x), count, rng)
+    beside = half_y + _log_uniform(nearest_m, max(60.0, half_y), count, rng)
+    behind = half_x + _log_uniform(nearest_m, max(40.0, half_x), count, rng)
     x = np.where(behind_an_end, -behind, rng.uniform(-BESIDE * half_x, BESIDE * half_x, count))
     y = np.where(behind_an_end, rng.uniform(-BESIDE * half_y, BESIDE * half_y, count), -beside)
     if not field.is_symmetric:

@@ -13,12 +13,6 @@ from worker.calibration.geometry.camera import Array
 from worker.calibration.geometry.field import Field, Marking
 from worker.calibration.relocalisation.line_view import labelled_places
 
-FINE_M = 0.1
-BEYOND_M = 6.0
-"""Margin of the map of distances beside the markings of the field."""
-ALIKE_M = 0.05
-"""Difference of radii below which circles are of one size."""
-
 
 @dataclass(frozen=True)
 class FieldMap:
@@ -44,9 +38,10 @@ class FieldMap:
     def of(cls, field: Field) -> FieldMap:
         """Return the map of a field, its roof included; spots are too small to be seen from afar."""
         lines = [marking for marking in field.markings() if not marking.spot]
-        fine = [_resampled(line, FINE_M) for line in lines]
+        fine_m = 0.1
+        fine = [_resampled(line, fine_m) for line in lines]
         # Approximate number of points on the markings that each pose of a population projects.
-        step = max(FINE_M, FINE_M * sum(len(points) for points in fine) / 420)
+        step = max(fine_m, fine_m * sum(len(points) for points in fine) / 420)
         coarse = [_resampled(line, step) for line in lines]
         everywhere = np.concatenate(fine)
         half = np.abs(everywhere).max(axis=0)
@@ -55,11 +50,13 @@ class FieldMap:
         # Least length of a straight piece, as a part of the longer side of the field: shorter ones (ticks, dashes) name
         # no line that an image line could be.
         shortest = 0.03 * 2 * float(half.max())
+        # Margin of the map of distances beside the markings of the field.
+        beyond_m = 6.0
         return cls(
             field.lift(np.concatenate(coarse)).astype(np.float32),
             np.concatenate([np.arange(len(points)) < len(points) - 1 for points in coarse]),
-            _from_nearest(everywhere, -half - BEYOND_M, half + BEYOND_M, cell),
-            -half - BEYOND_M,
+            _from_nearest(everywhere, -half - beyond_m, half + beyond_m, cell),
+            -half - beyond_m,
             cell,
             _straight(lines, 0, shortest),
             _straight(lines, 1, shortest),
@@ -115,13 +112,15 @@ def _between_circles(closed: list[Array]) -> Array:
     """Return the moves (R, 2) from each circle among closed polylines (n, 2) to others of its size."""
     middles = [line[:-1].mean(axis=0) for line in closed]
     radii = [np.linalg.norm(line - middle, axis=1) for line, middle in zip(closed, middles, strict=True)]
+    # Difference of radii below which circles are of one size.
+    alike_m = 0.05
     circles = [
-        (middle, radius.mean()) for middle, radius in zip(middles, radii, strict=True) if np.ptp(radius) < ALIKE_M
+        (middle, radius.mean()) for middle, radius in zip(middles, radii, strict=True) if np.ptp(radius) < alike_m
     ]
     moves = [
         there - here
         for here, one in circles
         for there, other in circles
-        if here is not there and abs(one - other) < ALIKE_M
+        if here is not there and abs(one - other) < alike_m
     ]
     return np.unique(np.round(moves, 3), axis=0) if moves else np.zeros((0, 2))

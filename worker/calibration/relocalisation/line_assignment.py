@@ -18,11 +18,6 @@ from worker.calibration.relocalisation.hypotheses import Hypotheses, rotations_o
 from worker.calibration.relocalisation.line_view import LineView
 from worker.calibration.relocalisation.rotation_voting import Direction
 
-ALONG = 0.012
-"""Largest angle, rad, between the plane of a segment and a direction along which it runs."""
-HIGHEST_M = 50.0
-BESIDE = 1.3
-
 
 def positions(field: FieldMap, view: LineView, direction: Direction, most: int) -> Hypotheses:
     """Return at most `most` hypotheses for each way that the field may be turned under the camera."""
@@ -39,8 +34,10 @@ def positions(field: FieldMap, view: LineView, direction: Direction, most: int) 
 def _positions(field: FieldMap, view: LineView, rotation: Array, focal: float) -> Array:
     """Return positions (n, 3), the best matched first."""
     normal = view.normals(focal) @ rotation
-    along_x = (np.abs(normal[:, 0]) < ALONG) & (np.abs(normal[:, 0]) < np.abs(normal[:, 1]))
-    along_y = (np.abs(normal[:, 1]) < ALONG) & ~along_x
+    # Largest angle, rad, between the plane of a segment and a direction along which it runs.
+    most_rad = 0.012
+    along_x = (np.abs(normal[:, 0]) < most_rad) & (np.abs(normal[:, 0]) < np.abs(normal[:, 1]))
+    along_y = (np.abs(normal[:, 1]) < most_rad) & ~along_x
     lengths = view.lengths
     on_y = _lines(normal[along_x, 2] / normal[along_x, 1], lengths[along_x])
     on_x = _lines(normal[along_y, 2] / normal[along_y, 0], lengths[along_y])
@@ -77,6 +74,7 @@ def _matched(
     scaled = _heights_and_places(first[0], first_markings)
     scores = _score(first, first_markings, *scaled.T)
     found = []
+    reach = 1.3
     for n in np.argsort(-scores)[:40]:
         height, place = scaled[n].tolist()
         if len(second[0]) and len(second_markings):
@@ -86,7 +84,7 @@ def _matched(
             found += [(height, place, float(places[m]), float(scores[n] + others[m])) for m in best]
         else:
             # Nothing measures the second axis.
-            places = np.linspace(-BESIDE * half, BESIDE * half, 14)
+            places = np.linspace(-reach * half, reach * half, 14)
             found += [(height, place, float(other), float(scores[n])) for other in places]
     return found
 
@@ -99,10 +97,11 @@ def _heights_and_places(measures: Array, markings: Array) -> Array:
     apart = markings_of_pairs[:, 0] - markings_of_pairs[:, 1]
     height = apart / (lines_of_pairs[:, :1] - lines_of_pairs[:, 1:])
     place = markings_of_pairs[:, 0] - height * lines_of_pairs[:, :1]
-    possible = (height > LOWEST_M) & (height < HIGHEST_M)
+    highest_m = 50.0
+    possible = (height > LOWEST_M) & (height < highest_m)
     by_two = np.stack([height[possible], place[possible]], axis=1)
 
-    usual = np.geomspace(LOWEST_M, HIGHEST_M, 22)[:, None, None]
+    usual = np.geomspace(LOWEST_M, highest_m, 22)[:, None, None]
     by_one = np.stack(np.broadcast_arrays(usual, markings - usual * measures[:2, None]), axis=-1).reshape(-1, 2)
     return np.concatenate([by_two, by_one])
 

@@ -14,8 +14,6 @@ from worker.calibration.geometry.lens import Lens
 
 WIDTH_PX = 480
 """Width of a frame in view pixels: hypotheses differ by as little as half a pixel of it."""
-WIDEST = 1.3
-"""Limit of undistorted views from the principal point, in widths of a frame."""
 
 
 @dataclass(frozen=True)
@@ -51,8 +49,10 @@ class LineView:
             cv2.resize(response, (2 * WIDTH_PX, round(2 * height * scale)), interpolation=cv2.INTER_AREA), np.uint8
         )
         border = _undistorted(lens.border(60), lens, focal)
-        low = np.maximum(border.min(axis=0), -WIDEST * WIDTH_PX)
-        high = np.minimum(border.max(axis=0), WIDEST * WIDTH_PX)
+        # Limit of undistorted views from the principal point, in widths of a frame.
+        widest = 1.3
+        low = np.maximum(border.min(axis=0), -widest * WIDTH_PX)
+        high = np.minimum(border.max(axis=0), widest * WIDTH_PX)
         shape = tuple(np.floor(high - low).astype(int)[::-1] + 1)
         cells = _cells(_undistorted(middles_of_paint(small) / (2 * scale), lens, focal) - low, shape)
         free = np.ones(shape, np.uint8)

@@ -16,10 +16,7 @@ from worker.calibration.relocalisation.hypotheses import rotations_of
 from worker.calibration.relocalisation.line_view import LineView
 from worker.calibration.relocalisation.sought import SoughtLens
 
-FINE = 0.006
-"""Angle, rad, between a direction and the plane of a segment at which its vote is 1/e."""
 APART_DEG = 4.0
-QUARTER = np.pi / 2
 
 
 @dataclass(frozen=True)
@@ -83,8 +80,12 @@ def _peaks(view: LineView, focal: float, count: int) -> list[Direction]:
 
 def _climbed(view: LineView, start: Direction, frees_focal: bool, rng: np.random.Generator) -> Direction:
     """Return the best direction near a peak, by narrower votes."""
+    # Angle, rad, between a direction and the plane of a segment at which its vote is 1/e.
+    tolerance_rad = 0.006
     best = Direction(
-        start.pan_tilt_roll, start.focal_px, float(_votes(view, start.pan_tilt_roll[None], start.focal_px, FINE)[0])
+        start.pan_tilt_roll,
+        start.focal_px,
+        float(_votes(view, start.pan_tilt_roll[None], start.focal_px, tolerance_rad)[0]),
     )
     for number in range(7):
         narrower = 0.6**number
@@ -94,7 +95,7 @@ def _climbed(view: LineView, start: Direction, frees_focal: bool, rng: np.random
         if frees_focal:
             tried += list(best.focal_px * np.exp(0.06 * narrower * rng.normal(size=5)))
         for focal in tried:
-            votes = _votes(view, offspring, focal, FINE)
+            votes = _votes(view, offspring, focal, tolerance_rad)
             if votes.max() > best.votes:
                 best = Direction(offspring[votes.argmax()], focal, float(votes.max()))
     return best
@@ -115,4 +116,5 @@ def _votes(view: LineView, pan_tilt_roll: Array, focal: float, tolerance: float)
 def _turned(one: Array, other: Array) -> float:
     """Return the largest of the differences of pan, tilt and roll, rad; a quarter turn of the pan is none."""
     pan, tilt, roll = one - other
-    return float(max(abs((pan + QUARTER / 2) % QUARTER - QUARTER / 2), abs(tilt), abs(roll)))
+    quarter = np.pi / 2
+    return float(max(abs((pan + quarter / 2) % quarter - quarter / 2), abs(tilt), abs(roll)))

@@ -19,9 +19,6 @@ from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.ground_view import sampled
 from worker.calibration.robust import USUAL
 
-BESIDE_M = 3.0
-"""Margin beside the field that is compared."""
-
 
 @dataclass(frozen=True)
 class GroundComparison:
@@ -64,7 +61,8 @@ class SharedGround:
     def of(cls, pitch: Field, frames: Mapping[str, Frame]) -> SharedGround:
         """Return the ground of a field and a little around it."""
         lines = pitch.line_points().position[:, :2]
-        low, high = lines.min(axis=0) - BESIDE_M, lines.max(axis=0) + BESIDE_M
+        beside_m = 3.0
+        low, high = lines.min(axis=0) - beside_m, lines.max(axis=0) + beside_m
         step_m = float((high - low).max()) / 400
         x, y = (np.arange(low[axis], high[axis], step_m) for axis in (0, 1))
         places = np.stack(np.meshgrid(x, y), axis=-1)

@@ -16,8 +16,8 @@ from worker.calibration.rendering.overlays import draw_line, legend, outline
 WIDTH_PX = 1600
 PAPER = (250, 250, 250)
 COVERED, BARE = (205, 235, 205), (215, 215, 250)
-CORNER, ARROW, CENTRE = (150, 90, 30), (40, 40, 220), (200, 0, 200)
-CLICKED, MISLABELLED, EXPECTED = (60, 200, 60), (40, 40, 240), (0, 200, 255)
+CORNER = (150, 90, 30)
+EXPECTED = (0, 200, 255)
 
 
 def coverage_picture(found: LensCalibration) -> Frame:
@@ -37,17 +37,19 @@ def coverage_picture(found: LensCalibration) -> Frame:
     # Length of the arrow for a residual of the median size.
     enlarged = 12.0 / max(float(np.median(lengths)) * scale, 1e-9)
     ends = found.corners + enlarged * found.off
+    arrow = (40, 40, 220)
     for corner, end in zip((found.corners + 0.5) * scale - 0.5, (ends + 0.5) * scale - 0.5, strict=True):
         cv2.circle(picture, _fixed(corner), 3 * 16, CORNER, cv2.FILLED, cv2.LINE_AA, shift=4)
-        cv2.line(picture, _fixed(corner), _fixed(end), ARROW, 1, cv2.LINE_AA, shift=4)
-    _cross(picture, (found.lens.matrix[:2, 2] + 0.5) * scale - 0.5, CENTRE, 16)
+        cv2.line(picture, _fixed(corner), _fixed(end), arrow, 1, cv2.LINE_AA, shift=4)
+    centre = (200, 0, 200)
+    _cross(picture, (found.lens.matrix[:2, 2] + 0.5) * scale - 0.5, centre, 16)
     legend(
         picture,
         [
             ("corner of the board", CORNER),
-            (f"residual x {enlarged:.0f}", ARROW),
+            (f"residual x {enlarged:.0f}", arrow),
             (f"no corner here ({1 - found.coverage.share:.0%})", BARE),
-            ("principal point", CENTRE),
+            ("principal point", centre),
         ],
     )
     return picture
@@ -61,14 +63,16 @@ def clicks_picture(pitch: Field, clicks: Clicks, found: FirstPose, frame: Frame 
     thick = max(1, round(width / 1500))
     _draw_pitch(picture, pitch, found.camera, thick)
     expected = found.camera.project(clicks.world)
+    clicked = (60, 200, 60)
+    mislabelled = (40, 40, 240)
     for pixel, place, verdict in zip(clicks.pixel, expected, found.clicks, strict=True):
-        colour = MISLABELLED if verdict.doubted else CLICKED
+        colour = mislabelled if verdict.doubted else clicked
         cv2.circle(picture, _fixed(pixel), 8 * thick * 16, colour, 2 * thick, cv2.LINE_AA, shift=4)
         if np.isfinite(place).all():
             _cross(picture, place, EXPECTED, 6 * thick)
             cv2.line(picture, _fixed(pixel), _fixed(place), colour, thick, cv2.LINE_AA, shift=4)
-    entries = [("pitch at the first pose", NEW_COLOUR), ("click", CLICKED), ("where its label is", EXPECTED)]
-    legend(picture, [*entries, ("does not fit its label", MISLABELLED)])
+    entries = [("pitch at the first pose", NEW_COLOUR), ("click", clicked), ("where its label is", EXPECTED)]
+    legend(picture, [*entries, ("does not fit its label", mislabelled)])
     return picture
 
 

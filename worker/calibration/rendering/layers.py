@@ -15,11 +15,6 @@ from worker.calibration.rendering.overlays import EDGE_GAP, STORED_COLOUR, draw_
 
 Layer = NDArray[np.uint8]
 
-# Nobody sees more steps of it, and every one makes the file larger; below the first, the network says no.
-MASK_STEPS = 8
-# Width of the seam, in pixels.
-SEAM_PX = 2
-
 
 def stored_layer(pitch: Field, camera: Camera, size: tuple[int, int]) -> Layer:
     """Draw the centre of each marking by the stored pose; `size`: width, height of the picture it is laid over."""
@@ -42,7 +37,9 @@ def mask_layer(response: NDArray[np.uint8], size: tuple[int, int]) -> Layer:
     reach = max(1, round(response.shape[1] / size[0]))
     strongest = cv2.dilate(response, np.ones((reach, reach), np.uint8))
     alpha = cv2.resize(strongest, size, interpolation=cv2.INTER_AREA)
-    stepped = np.floor(alpha / 256 * MASK_STEPS) / (MASK_STEPS - 1)
+    # Nobody sees more steps of it, and every one makes the file larger; below the first, the network says no.
+    mask_steps = 8
+    stepped = np.floor(alpha / 256 * mask_steps) / (mask_steps - 1)
     # Nothing on a field is of this colour.
     # The frame stays visible through a mask that is sure.
     return _of((255, 60, 230), np.rint(255 * 0.8 * stepped).astype(np.uint8))
@@ -55,7 +52,7 @@ def seam_layer(owner: NDArray[np.int8]) -> Layer:
         one, other = (np.take(owner, range(k, owner.shape[axis] - 1 + k), axis) for k in (0, 1))
         changes = (one != other) & (one >= 0) & (other >= 0)
         seam[: changes.shape[0], : changes.shape[1]] |= changes.astype(np.uint8)
-    wide = cv2.dilate(seam, np.ones((SEAM_PX, SEAM_PX), np.uint8))
+    wide = cv2.dilate(seam, np.ones((2, 2), np.uint8))
     rows, columns = np.indices(owner.shape)
     # Nothing on a field is of this colour.
     return _of((0, 235, 255), np.where((rows + columns) // 14 % 2 == 0, 255 * wide, 0).astype(np.uint8))

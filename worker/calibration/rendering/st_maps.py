@@ -17,8 +17,6 @@ from worker.calibration.geometry.lens import Lens
 StMap = NDArray[np.float32]
 # Value of pixels that nothing is behind: outside of every picture, and no NaN, which compositors spread.
 NOWHERE = -1.0
-# Rows at a time: memory is bounded by the stripe, not by the picture.
-STRIPE = 64
 
 
 def undistorting(lens: Lens) -> StMap:
@@ -50,8 +48,10 @@ def _st_map(size: tuple[int, int], sample: Callable[[Array], Array]) -> StMap:
     """
     width, height = size
     found = np.empty((height, width, 2), np.float32)
-    for top in range(0, height, STRIPE):
-        rows = np.arange(top, min(top + STRIPE, height))
+    # Rows at a time: memory is bounded by the stripe, not by the picture.
+    stripe = 64
+    for top in range(0, height, stripe):
+        rows = np.arange(top, min(top + stripe, height))
         pixels = np.stack(np.meshgrid(np.arange(width), rows), axis=-1).astype(float)
         found[rows] = np.nan_to_num((sample(pixels) + 0.5) / [width, height], nan=NOWHERE)
     return found

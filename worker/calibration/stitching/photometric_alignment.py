@@ -17,19 +17,11 @@ from worker.calibration.geometry.ground_view import quality, sampled
 from worker.calibration.stitching.photometry import MIDDLE, Light, squared_radius
 from worker.calibration.stitching.views import ViewChoice, chosen_view
 
-# Cameras are compared in a smoothed view: neither noise nor the edges of what stands off the ground.
-SMOOTHED_PX = 2.0
 # Values this dark or bright say nothing about exposure.
 EXPOSED = (16, 240)
 # A larger gain is no matter of exposure.
 LARGEST_GAIN = 1.5
 UNKNOWNS = 5
-# Log ratios of how well two cameras see at which seams are tried.
-SEAMS = np.linspace(-1.5, 1.5, 31)
-# Log differences above this are all alike: somebody stands there.
-OUTRIGHT = 0.7
-# Sigma of the place of a seam.
-SEAM_SIGMA = 0.2
 
 
 def evened_out(pitch: Field, cameras: Sequence[Camera], frames: Mapping[str, Frame]) -> dict[str, Light]:
@@ -81,13 +73,15 @@ def _seen(camera: Camera, frame: Frame, points: Array) -> _Seen:
     within = inside(pixels, size)
     values = sampled(frame, pixels, within).astype(np.float32)
     exposed = within & (values.min(axis=-1) > EXPOSED[0]) & (values.max(axis=-1) < EXPOSED[1])
+    # Neither noise nor the edges of what stands off the ground.
+    smoothed_px = 2.0
     share, total = (
-        cv2.GaussianBlur(part, (0, 0), SMOOTHED_PX)
+        cv2.GaussianBlur(part, (0, 0), smoothed_px)
         for part in (exposed.astype(np.float32), np.where(exposed[..., None], np.log(np.maximum(values, 1)), 0))
     )
     logs: NDArray[np.float32] = (np.asarray(total) / np.maximum(np.asarray(share), 1e-6)[..., None]).astype(np.float32)
     radius = squared_radius(np.nan_to_num(pixels).astype(np.float32), size)
-    every = slice(None, None, round(SMOOTHED_PX))
+    every = slice(None, None, round(smoothed_px))
     valid = exposed & (np.asarray(share) > 0.5)
     sees = quality(size, pixels)
     return _Seen(logs[every, every], valid[every, every], radius[every, every], sees[every, every])
@@ -147,12 +141,13 @@ def _solved(overlaps: Sequence[_Overlap], count: int) -> Array:
 def _reaches(overlaps: Sequence[_Overlap], seen: Sequence[_Seen], numbers: Array) -> Array:
     """Return the reach of each camera that brings the seam of each pair to where the two differ least."""
     normal, right = np.eye(len(seen)), np.zeros(len(seen))
+    seam_sigma = 0.2
     for overlap in overlaps:
         i, j = overlap.cameras
         sign = np.zeros(len(seen))
         sign[[i, j]] = -1, 1
-        normal += np.outer(sign, sign) / SEAM_SIGMA**2
-        right += sign * _best_seam(seen[i], seen[j], numbers[i], numbers[j]) / SEAM_SIGMA**2
+        normal += np.outer(sign, sign) / seam_sigma**2
+        right += sign * _best_seam(seen[i], seen[j], numbers[i], numbers[j]) / seam_sigma**2
     return np.asarray(np.linalg.solve(normal, right), float)
 
 
@@ -162,10 +157,14 @@ def _best_seam(first: _Seen, second: _Seen, by_first: Array, by_second: Array) -
     ratio = np.log(first.quality[both] / second.quality[both])
     apart = np.abs(first.evened(by_first) - second.evened(by_second)).mean(axis=-1)[both]
     costs = []
-    for seam in SEAMS:
+    # Log ratios of how well two cameras see at which seams are tried.
+    seams = np.linspace(-1.5, 1.5, 31)
+    # Log differences above this are all alike: somebody stands there.
+    outright = 0.7
+    for seam in seams:
         along = np.abs(ratio - seam) < 0.2
-        differing = np.minimum(apart[along], OUTRIGHT).mean() if along.any() else OUTRIGHT
+        differing = np.minimum(apart[along], outright).mean() if along.any() else outright
         # A seam is moved for a difference that grows with its square: most of both pictures is left where it is seen
         # best.
         costs.append(differing + 0.005 * seam**2)
-    return float(SEAMS[np.argmin(costs)])
+    return float(seams[np.argmin(costs)])

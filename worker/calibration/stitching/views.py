@@ -16,10 +16,6 @@ from worker.calibration.geometry.rotation import rotation_matrices, rotation_vec
 Projection = Literal["pannini", "cylinder", "rectilinear", "birds-eye"]
 LevelProjection = Literal["pannini", "cylinder", "rectilinear"]
 
-# A view shows this much to the sides of the visible field, in widths of it in the picture.
-AROUND_SIDES = 0.03
-# Margin around the field from above, in metres.
-AROUND_PITCH_M = 3.0
 # Widest field of view of each projection; beyond it the picture is mostly its own corners.
 WIDEST_DEG: dict[LevelProjection, float] = {"pannini": 270.0, "cylinder": 340.0, "rectilinear": 140.0}
 # Steps of a view's place, direction and window (metres, degrees, parts of the focal length): a night's wind, which
@@ -176,7 +172,8 @@ _ONTO_PLANE: dict[LevelProjection, Callable[[Array, Array, Array], tuple[Array, 
 
 def _from_above(pitch: Field, choice: ViewChoice) -> ViewFromAbove:
     """Return the view of all of the field and a little around it, in the chosen size, or as high as it needs."""
-    across, up = pitch.length + 2 * AROUND_PITCH_M, pitch.width + 2 * AROUND_PITCH_M
+    margin_m = 3.0
+    across, up = pitch.length + 2 * margin_m, pitch.width + 2 * margin_m
     height = choice.height or _even(choice.width * up / across)
     return ViewFromAbove(max(across / choice.width, up / height), (choice.width, height))
 
@@ -274,7 +271,9 @@ def _window(
     on_plane = on_plane[within]
     (left, top), (right, bottom) = on_plane.min(axis=0), on_plane.max(axis=0)
     width, height = right - left, bottom - top
-    left, right = left - AROUND_SIDES * width, right + AROUND_SIDES * width
+    # So much around the visible field, in its widths and heights in the picture.
+    aside = 0.03 * width
+    left, right = left - aside, right + aside
     top, bottom = top - 0.8 * height, bottom + 0.15 * height
 
     step = (right - left) / 240

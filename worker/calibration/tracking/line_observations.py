@@ -28,9 +28,6 @@ from worker.calibration.tracking.telling_pieces import most_telling
 
 FEW, LEARNING = 200, 25
 """Number of pieces that are looked at after `LEARNING` looks at all of them."""
-SEARCH_PX, NEAR_PX = 8.0, 3.0
-"""Half widths of the search for pieces, in pixels of a 4K frame: at first, and again from where the camera is then
-found."""
 FEWEST_PIECES = 20
 """Fewest pieces of line for a frame to count."""
 AT_REFERENCE_PX = 3.0
@@ -163,16 +160,19 @@ class TrackedLines:
 
         What is measured far from where it was expected is a little off.
         """
-        read = self._read(picture, expected, pieces, SEARCH_PX)
-        sighting = self._within(SEARCH_PX, read, expected)
+        # Half widths of the search, in pixels of a 4K frame: at first, and again from where the camera is then found.
+        search_px = 8.0
+        read = self._read(picture, expected, pieces, search_px)
+        sighting = self._within(search_px, read, expected)
         if sighting is None:
             return None
         if np.median(np.abs(sighting.seen.offset)) < 2.0 * self._scale:
             return sighting
         found = moved(self.reference, sighting.observed.change)
-        if not read.profiles.cover(found, read.lines, NEAR_PX * self._scale):
-            read = self._read(picture, found, pieces, NEAR_PX)
-        return self._within(NEAR_PX, read, found)
+        near_px = 3.0
+        if not read.profiles.cover(found, read.lines, near_px * self._scale):
+            read = self._read(picture, found, pieces, near_px)
+        return self._within(near_px, read, found)
 
     def _read(self, picture: PixelReader, expected: Camera, pieces: NDArray[np.intp], reach_px: float) -> _ReadPieces:
         lines = self._pieces[pieces]
