@@ -41,8 +41,7 @@ class PixelReader(Protocol):
     """Picture that is read between its pixels, at given places only."""
 
     def read(self, channel: int, column: NDArray[np.float32], row: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Return the brightness (P, N) 0..255 in one channel, or `LUMA`, at columns and rows (P, N); NaN outside the
-        picture."""
+        """Return the brightness (P, N) 0..255 in a channel, or `LUMA`, at columns and rows (P, N); NaN outside."""
         ...
 
 

@@ -137,8 +137,7 @@ def _inside(area: NDArray[np.bool_], pixels: Array) -> NDArray[np.bool_]:
 
 
 def _mean_of_tries(hits: NDArray[np.bool_], not_tried: NDArray[np.bool_]) -> Array:
-    """Return the hit rate (M,) over the tries (M, G) of a piece that count; the mean of the other pieces if none
-    does."""
+    """Return the hit rate (M,) over the tries (M, G) of a piece that count; the others' mean if none does."""
     tried = (~not_tried).sum(axis=1)
     usual = float((hits & ~not_tried).sum()) / max(int(tried.sum()), 1)
     return np.where(tried > 0, (hits & ~not_tried).sum(axis=1) / np.maximum(tried, 1), usual)

@@ -28,8 +28,7 @@ GRID_PX = 32
 
 @dataclass(frozen=True)
 class Sway:
-    """Displacement of a frame against the still view: `shift` (h, w, 2) px at every `GRID_PX`-th pixel, None for
-    none."""
+    """Displacement of a frame against the still view: `shift` (h, w, 2) px at every `GRID_PX`-th pixel, or None."""
 
     shift: NDArray[np.float32] | None
 

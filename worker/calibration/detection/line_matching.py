@@ -65,8 +65,7 @@ class Matches:
     sampling_px: float
 
     def with_polarity(self, sign: int) -> Matches:
-        """Return the matches for lines that are brighter (1) or darker (-1) than their ground; other paint is not
-        considered."""
+        """Return the matches for lines brighter (1) or darker (-1) than their ground; ignores other paint."""
         return self if sign == 1 else replace(self, correlation=-self.correlation, along=-self.along)
 
     def where(self, chosen: NDArray[np.bool_], sign: int) -> Matches:
@@ -106,8 +105,7 @@ def match_lines(seen: VisibleLines, channels: Channels, reach_px: float, relativ
 
 
 def known_contrasts(seen: VisibleLines, channels: Channels, reach_px: float, relative_size: float) -> NDArray[np.intp]:
-    """Return the contrast of each marking in one picture, (K, 2): the channel, and 1 for brighter or -1 for darker
-    there.
+    """Return the contrast of each marking in one picture, (K, 2): the channel, and 1 for brighter or -1 for darker.
 
     Luma replaces green for all markings that luma shows as well.
     """
@@ -127,8 +125,7 @@ def known_contrasts(seen: VisibleLines, channels: Channels, reach_px: float, rel
 def match_known(
     seen: VisibleLines, picture: PixelReader, contrasts: NDArray[np.intp], reach_px: float, relative_size: float
 ) -> list[Matches]:
-    """Return the matches of lines whose markings have known `contrasts` (K, 2) (see `known_contrasts`), by class of
-    width."""
+    """Return the matches of lines by known `contrasts` (K, 2) of the markings (see `known_contrasts`), by width."""
     bend, of_lines = _bend(seen), contrasts[seen.points.marking]
     matches = []
     for channel, sign in np.unique(of_lines, axis=0).tolist():
@@ -169,8 +166,7 @@ def _strongest(strength: Array) -> NDArray[np.intp]:
 
 
 def _without_other_paint(looked: Mapping[int, list[Matches]], colour: NDArray[np.str_]) -> dict[int, list[Matches]]:
-    """Return the matches in three channels with places opposed that have another colour than the paint (N,) of the
-    lines."""
+    """Return the matches in three channels, opposed where another colour than the paint (N,) is seen."""
     freed = {channel: list(classes) for channel, classes in looked.items()}
     for number, (green, red, blue) in enumerate(zip(*(looked[c] for c in (GREEN, RED, BLUE)), strict=True)):
         named = colour[red.which] != WHITE

@@ -69,8 +69,7 @@ class Measurements:
         return len(self.index)
 
     def offset(self, camera: Camera, positions: Array) -> Array:
-        """Return pixels (M,) along the normals from where `camera` puts points (M, 3) to where the lines were
-        measured."""
+        """Return pixels (M,) along the normals from where `camera` puts points (M, 3) to the measured lines."""
         return np.asarray(np.sum((self.pixel - camera.project(positions)) * self.normal, axis=1))
 
     def jacobian(self, camera: Camera, positions: Array) -> Array:
@@ -235,8 +234,7 @@ class _Centred:
         self._centre = np.zeros(len(width_px))
 
     def at(self, row: NDArray[np.intp], window: NDArray[np.intp]) -> Array:
-        """Return pixels (M,) from the middles of windows `window` (M,) of rows `row` (M,) to the centres of their
-        lines."""
+        """Return pixels (M,) from the middles of windows (M,) of rows (M,) to the centres of their lines."""
         new = window != self._window[row]
         if new.any():
             there, begins = row[new], window[new]

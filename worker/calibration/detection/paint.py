@@ -52,8 +52,7 @@ def _angle(one: Array, other: Array) -> float:
 
 
 def draw_colours(frame: Frame, colours: Array, chosen: Sequence[int]) -> Frame:
-    """Return the frame (H, W, 3) in grey: the chosen ones of the `colours` (K, 3) of its lines are bright, and all else
-    is as dark as the ground."""
+    """Return the frame (H, W, 3) in grey, bright where it has the chosen ones of the `colours` (K, 3) of lines."""
     sizes = np.linalg.norm(colours, axis=1)
     directions = (colours / sizes[:, None]).T.astype(np.float32)
     drawn = np.empty_like(frame)
@@ -75,8 +74,7 @@ def draw_colours(frame: Frame, colours: Array, chosen: Sequence[int]) -> Frame:
 
 
 def _colours_of_lines(frame: Frame, regions: Sequence[Region]) -> NDArray[np.float32]:
-    """Return differences (N, 3) to the ground of pixels that differ more than their neighbours: the middles of
-    lines."""
+    """Return differences (N, 3) to the ground of pixels that differ most around them: the middles of lines."""
     looked_at = np.zeros(frame.shape[:2], dtype=bool)
     for region in regions:
         looked_at[region.top : region.bottom, region.left : region.right] = True

@@ -57,8 +57,7 @@ def _steep_places(small: NDArray[np.uint8], where: NDArray[np.bool_]) -> tuple[A
 
 
 def _profiles(frame: Frame, pixel: Array, direction: Array, step: float) -> Array:
-    """Read the brightness (N, 2 REACH + 1) along directions (N, 2) through pixels (N, 2), averaged a little to either
-    side."""
+    """Read the brightness (N, 2 REACH + 1) along directions (N, 2) through pixels (N, 2), averaged aside."""
     along = np.stack([-direction[:, 1], direction[:, 0]], axis=1)
     offsets = step * np.arange(-REACH, REACH + 1)
     total = np.zeros((len(pixel), len(offsets)))
@@ -73,8 +72,7 @@ def _profiles(frame: Frame, pixel: Array, direction: Array, step: float) -> Arra
 
 
 def _edges(profiles: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Measure the steepest rise in profiles (N, S): its standard deviation in steps, its height, True if it ends
-    inside."""
+    """Measure the steepest rise in profiles (N, S): standard deviation in steps, height, True if it ends inside."""
     slope = np.diff(profiles, axis=1)
     slope = (
         np.pad(slope, ((0, 0), (1, 1)), mode="edge")[:, :-2]

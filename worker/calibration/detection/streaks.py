@@ -24,8 +24,7 @@ LEAST_CONTRAST = 5.0
 
 @dataclass(frozen=True)
 class Streaks:
-    """Contrast (levels, directions, H, W) of pixels against both of their sides; coarser levels have smaller
-    pictures."""
+    """Contrast (levels, directions, H, W) of pixels against both of their sides, level by level."""
 
     strength: tuple[NDArray[np.uint8], ...]
 
@@ -48,8 +47,7 @@ class Streaks:
         )
 
     def read(self, lines: VisibleLines, pixels: Array) -> NDArray[np.float32]:
-        """Return the strength (N, K) at pixels (N, K, 2) of streaks as wide as N lines and in their directions; 0
-        outside."""
+        """Return the strength (N, K) at pixels (N, K, 2) of streaks with the widths and directions of N lines."""
         level, direction = level_of(lines.width_px), direction_of(lines.normal)[:, None]
         values = np.zeros(pixels.shape[:-1], np.float32)
         for number, planes in enumerate(self.strength):

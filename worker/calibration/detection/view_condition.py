@@ -87,8 +87,7 @@ class UsualView:
 
 @dataclass(frozen=True)
 class ViewCondition:
-    """Judgement of a view. `cause` and `where` (part of the visible field): None for a usable view. `words`: one
-    sentence for people."""
+    """Judgement of a view in `words`. `cause` and `where` in the visible field: None for a usable view."""
 
     usable: bool
     cause: Cause | None
@@ -130,8 +129,7 @@ def look_at(frame: Frame, pitch: Field, camera: Camera, usual: UsualView | None 
 
 
 def least_light(noise: float, least: float = LEAST_LIGHT) -> float:
-    """Return the least brightness (0..255) of a field, at least `least`, that shows its lines through the `noise` of a
-    pixel."""
+    """Return the least brightness (0..255) of a field that shows lines through the `noise` of a pixel."""
     return max(least, 2.0 * noise)
 
 
@@ -395,8 +393,7 @@ class _Sharpness:
 
     @classmethod
     def of(cls, frame: Frame, grey: NDArray[np.uint8], field: Mask, lost: Mask) -> _Sharpness:
-        """Measure the blur of a frame and its reduced grey picture, with the cells of the field and those without
-        lines."""
+        """Measure the blur of a frame and its reduced grey picture, with the cells of the field and the lost ones."""
         clear = field & ~lost
         of_all = edge_blur_px(frame, grey, _enlarged(field, grey.shape))
         if min(clear.sum(), lost.sum()) < FEWEST_CELLS:

@@ -40,8 +40,7 @@ USUAL_COUNTS = 1.0
 
 @dataclass(frozen=True)
 class MarkingReport:
-    """Report on a marking as one camera sees it: `expected_m` of it in view, and the share 0..1 of that which is
-    `found`.
+    """Report on a marking as one camera sees it: `expected_m` in view, and the share 0..1 of that `found`.
 
     `offset_m` ± `sigma_m`: distance of its paint from where the venue has it, across it on the ground, on the side that
     `direction` names if positive and on the opposite one if negative. None where that cannot be told.
@@ -107,8 +106,7 @@ def _farther_away(
     channels: Channels,
     response: NDArray[np.float32],
 ) -> Measurements | None:
-    """Return the measurements that the camera was judged by, with those farther away for markings that are hardly
-    found."""
+    """Return the measurements of a camera, taken farther away for markings that are hardly found."""
     measured, evidence, camera = found.measured, found.evidence, found.camera
     if measured is None:
         return None
@@ -310,8 +308,7 @@ def _rises(ground: Ground, measured: Measurements) -> Array:
 
 
 def _by_lens(camera: Camera, points: Array, measured: Measurements) -> Array:
-    """Return the moves (M, 6), in px along their normals, of points (M, 3) by one sigma of each parameter of the
-    lens."""
+    """Return the moves (M, 6), px along their normals, of points (M, 3) by one sigma of each lens parameter."""
     expected = np.array([number.expected for number in lens_parameters([camera])])
     return np.nan_to_num(-measured.lens_jacobian(camera, points) * expected)
 
@@ -319,8 +316,7 @@ def _by_lens(camera: Camera, points: Array, measured: Measurements) -> Array:
 def _given_way(
     ground: Ground, rises: Array, measured: Measurements, jacobian: Array, weight: Array, uneven_m: float
 ) -> Array:
-    """Return the moves of the pose (6, M) for an offset of one sigma at each measured point, where the ground gives way
-    as well.
+    """Return the moves of the pose (6, M) for an offset of one sigma at each point, where the ground yields too.
 
     `jacobian` (M, 6) of the offsets by the pose; `weight` (M,) that the refinement gave them.
     """

@@ -53,8 +53,7 @@ LEAST_SUPPORT_M = 4.0
 
 @dataclass(frozen=True)
 class Registration:
-    """Displacement of the second camera's markings relative to the first's: `dx_px`, `dy_px` along the world's axes,
-    pixels of 10 cm.
+    """Displacement `dx_px`, `dy_px` of the second camera's markings, world's axes, pixels of 10 cm.
 
     Where the common markings are all parallel, only the displacement across them. `support`: metres of marking that
     both views show on top of each other once registered. `pair`: the ids of the cameras. Measured `at` a point (2,) of
@@ -116,8 +115,7 @@ def register_pair(
 def pair_error_px(
     pitch: Field, registration: Registration, found: tuple[Camera, Camera], others: tuple[Camera, Camera]
 ) -> float:
-    """Return the distance, in pixels of 10 cm, between two cameras' places of the same markings by `others`' poses and
-    lenses.
+    """Return the distance (pixels of 10 cm) between two cameras' places of the same markings as `others`.
 
     They were registered as they are `found`: what they see at the registered point is put elsewhere by other poses.
     """
@@ -139,8 +137,7 @@ def _put(pitch: Field, camera: Camera, pixel: Array) -> Array:
 
 
 def reference_point(pitch: Field, first: Camera, second: Camera) -> Array | None:
-    """Return the field's centre (2,) if both cameras see it, else the middle of the common markings around the
-    nearest one."""
+    """Return the field's centre (2,) if both see it, else the middle of the common markings nearest to it."""
     points = np.concatenate([pitch.lift(np.zeros((1, 2))), pitch.line_points(0.5).position])
     seen = np.all([camera.sees(camera.project(points)) for camera in (first, second)], axis=0)
     if not seen.any():
@@ -153,8 +150,7 @@ def reference_point(pitch: Field, first: Camera, second: Camera) -> Array | None
 
 
 def directions_in_common(pitch: Field, first: Camera, second: Camera, centre: Array) -> int:
-    """Return the number of directions, 0 to 2, in which the markings that both cameras should see around a point (2,)
-    hold a view.
+    """Return in how many directions, 0 to 2, the common markings around a point (2,) should hold a view.
 
     There must be enough line across a direction, and it must not be so far aside that a turn and a move of a camera
     which cancel there still shift the point: a court whose centre has no circle is held along its centre line by
@@ -211,8 +207,7 @@ def _best_fit(pitch: Field, segmented: Sequence[Segmented], centre: Array, expec
 
 
 def _guesses(pitch: Field, segmented: Sequence[Segmented], centre: Array) -> list[tuple[Array, Array]]:
-    """Return a place to measure (2,) and the views' apparent displacement (2,) there; nothing where that is next to
-    none."""
+    """Return a place to measure (2,) and the views' apparent displacement (2,) there; nothing if that is small."""
     grid = _square(centre, COARSE_HALF_M, COARSE_STEP_M)
     views = [ground_view(pitch, camera, response, grid) for camera, response in segmented]
     shift = _coarse_shift(views[0], views[1], pitch.line_width)
@@ -266,8 +261,7 @@ def _template(pitch: Field, centre: Array) -> BirdsEye:
 
 
 def _coarse_shift(first: BirdsEye, second: BirdsEye, line_width: float) -> Array | None:
-    """Return the shift (2,) in metres, world axes, of the second view relative to the first with the highest
-    correlation."""
+    """Return the shift (2,), m, of the second view relative to the first with the highest correlation."""
     a_seen, b_seen = first[1], second[1]
     a, b = (_smooth(view, 0.4, COARSE_STEP_M, line_width) * view[1] for view in (first, second))
     # Largest displacement of two views that is found.
@@ -311,8 +305,7 @@ def forms_of_both(first: Camera, second: Camera, points: Array) -> Array:
 
 
 def _displacement(camera: Camera, points: Array, moves: Array) -> Array:
-    """Return the displacement (..., 2) metres of points (..., 3) by `moves` (6,): `_forms` times those, without the
-    forms."""
+    """Return the displacement (..., 2) m of points (..., 3) by `moves` (6,): `_forms` times those."""
     change = EXPECTED * moves
     ray = points - camera.pose.position
     carried = change[3:] + np.cross(ray, camera.pose.matrix.T @ change[:3])
@@ -367,8 +360,7 @@ def _fine_moves(
 def _moved(
     views: Sequence[Response], seen: Sequence[Response], forms: Array, moves: Array, stride: int
 ) -> tuple[list[Response], Mask]:
-    """Return both views at every `stride`th point after some moves (12,) of their cameras, and the mask of points
-    both see."""
+    """Return both views at every `stride`th point after moves (12,) of the cameras, and the mask that both see."""
     # Plain matrices multiply ten times faster.
     offsets = [
         (forms[..., its].reshape(-1, 6) @ moves[its]).reshape(forms.shape[:3]) for its in (slice(6), slice(6, 12))

@@ -35,8 +35,7 @@ class TriedRidge:
 
 @dataclass(frozen=True)
 class TriedRidges:
-    """Ridges of all lengths. `held`: the field with its own length; `tried`: every `SPACING_M` from none to the
-    whole field."""
+    """Ridges of all lengths, `tried` every `SPACING_M`. `held`: the field with its own length."""
 
     held: Field
     tried: Sequence[TriedRidge]
@@ -81,8 +80,7 @@ class TriedRidges:
 
 
 def try_ridges(base: RefinedPoses, free: Sequence[Parameter], observations: Observations) -> TriedRidges:
-    """Try ridges of all lengths on the lines of a refinement; `free`: parameters found anew for each, with the
-    poses."""
+    """Try ridges of all lengths on the lines of a refinement; `free`: parameters found anew for each."""
     lines = base.pitch.line_points()
     measured = observations.reader().measure(lines, base.cameras, EVALUATION_SEARCH_PX)
     unknowns = Unknowns(len(base.cameras), free, Ground.under(lines))

@@ -69,8 +69,7 @@ def measure_displacement(pitch: Field, anchor: Camera, found: CameraResult) -> D
 
 
 def farthest_place(pitch: Field, camera: Camera) -> Array | None:
-    """Return the point (3,) of the markings in view that is farthest from the camera along the ground, m; None
-    without any."""
+    """Return the point (3,) of the markings in view that is farthest along the ground, m; None without any."""
     lines = pitch.line_points().position
     seen = lines[camera.sees(camera.project(lines))]
     if len(seen) == 0:
@@ -81,16 +80,14 @@ def farthest_place(pitch: Field, camera: Camera) -> Array | None:
 
 
 def sight_axes(camera: Camera, place: Array) -> Array:
-    """Return unit vectors (2, 2) on the ground at `place`: across the line of sight, to the right, and along it,
-    away."""
+    """Return unit vectors (2, 2) on the ground at `place`: across the line of sight (right), and along it (away)."""
     away = (place - camera.pose.position)[:2]
     away = away / np.linalg.norm(away)
     return np.array([[away[1], -away[0]], away])
 
 
 def ground_point(camera: Camera, pixel: Array, height: float) -> Array:
-    """Return the point (3,), m, where the ray through a pixel (2,) meets the level plane of a height; NaN where it
-    does not."""
+    """Return the point (3,), m, where the ray through a pixel (2,) meets the plane of a height; NaN if nowhere."""
     return np.append(on_the_ground(camera, pixel[None], np.array([height]))[0], height)
 
 

@@ -121,8 +121,7 @@ def compare_pairs(pitch: Field, cameras: Sequence[CameraResponse]) -> list[Pair]
 
 
 def _shift_px(pitch: Field, registered: Registration | None, cameras: Sequence[Camera]) -> float:
-    """Return the distance between a pair's places of the same point, in pixels of the frame that shows it larger;
-    inf if unknown."""
+    """Return the distance of a pair's places of one point, px of the frame that shows it larger; inf if unknown."""
     if registered is None:
         return np.inf
     apart = PIXEL_M * np.array([registered.dx_px, registered.dy_px])

@@ -55,8 +55,7 @@ class Gate:
         return max(self.largest_residual_px * camera.intrinsics.relative_size, self.residual_floor_px)
 
     def least_share(self, seen: Evidence) -> float:
-        """Return the least share of the markings that has to be seen, 0..1, with as much found by chance as there
-        is."""
+        """Return the least share of the markings that has to be seen, 0..1, beside what chance finds."""
         return seen.by_chance + self.least_agreement * max(1 - seen.by_chance, LEAST_ROOM)
 
 
@@ -88,8 +87,7 @@ class Refusal:
 
 @dataclass(frozen=True)
 class Moved:
-    """Change from the stored pose to the new one: degrees, metres, and the mean shift of the visible markings in
-    pixels."""
+    """Change from the stored pose to the new one: degrees, metres, mean shift of the visible markings in pixels."""
 
     rotation_deg: float
     position_m: float

@@ -64,8 +64,7 @@ def ground_jacobian(camera: Camera, points: Array) -> Array:
 
 
 def full_ground_jacobian(camera: Camera, points: Array) -> Array:
-    """Jacobian (..., 2, 12) of ground positions by errors in pose and lens, per rad, metre and unit of
-    `LENS_PARAMETERS`."""
+    """Jacobian (..., 2, 12) of ground positions by pose and lens, per rad, m and `LENS_PARAMETERS`."""
     by_all = full_pixel_jacobian(camera, points)
     # A camera that is shifted along the ground puts all of it there.
     by_ground = by_all[..., 3:5]
@@ -79,14 +78,12 @@ def _in_camera(camera: Camera, points: Array) -> Array:
 
 
 def _rays(seen: Array) -> Array:
-    """Return undistorted image coordinates (..., 2) at depth 1 of points (..., 3) in the camera's frame; NaN behind
-    it."""
+    """Return image coordinates (..., 2) at depth 1 of points (..., 3) in the camera's frame; NaN behind it."""
     depth = seen[..., 2:]
     return seen[..., :2] / np.where(depth > NEAREST_DEPTH_M, depth, np.nan)
 
 
 def _point_jacobian(camera: Camera, seen: Array) -> Array:
-    """Jacobian (..., 3, 6) of points (..., 3) in the camera's frame by its pose: w x p for a turn w, and minus the
-    shift."""
+    """Jacobian (..., 3, 6) of points (..., 3) in the camera's frame by its pose: turn w as w x p, and shift."""
     shift = np.broadcast_to(-camera.pose.matrix, (*seen.shape, 3))
     return np.concatenate([-cross_matrices(seen), shift], axis=-1)

@@ -39,8 +39,7 @@ def farthest_marking(pitch: Field, camera: Camera) -> Array:
 
 
 def on_the_ground(camera: Camera, pixels: Array, height: Array) -> Array:
-    """Return the points (N, 2) where rays through pixels (N, 2) meet the planes z = height (N,); NaN where they do
-    not."""
+    """Return the points (N, 2) where rays of pixels (N, 2) meet the planes z = height (N,); NaN if nowhere."""
     ray = camera.rays(pixels)
     with np.errstate(divide="ignore", invalid="ignore"):
         along = (height - camera.pose.position[2]) / ray[:, 2]

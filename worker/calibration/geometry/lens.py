@@ -78,8 +78,7 @@ class Lens(ABC):
 
     @abstractmethod
     def undistort(self, pixels: ArrayLike) -> Array:
-        """Return undistorted image coordinates (..., 2) at depth 1 of pixels (..., 2); NaN where the model has no
-        ray."""
+        """Return image coordinates (..., 2) at depth 1 of pixels (..., 2); NaN where the model has no ray."""
 
     @property
     @abstractmethod
@@ -258,8 +257,7 @@ class Intrinsics(Lens):
         return self._on_tilted(x, y, np.stack([by_k1, by_k1 * r2[..., None]], axis=-1))
 
     def _radial(self, r2: Array) -> tuple[Array, Array, Array]:
-        """Return the radial factor, its derivative by `r2`, and its denominator, for rays of squared radius `r2`
-        (...)."""
+        """Return radial factor, its derivative by `r2`, and its denominator at squared radius `r2` (...)."""
         k1, k2, _, _, k3, k4, k5, k6 = self.coefficients[:8].tolist()
         denominator = 1 + r2 * (k4 + r2 * (k5 + r2 * k6))
         radial = (1 + r2 * (k1 + r2 * (k2 + r2 * k3))) / denominator

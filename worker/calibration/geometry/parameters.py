@@ -125,8 +125,7 @@ def with_lens_changed(camera: Camera, changes: Array) -> Camera:
 
 
 def lens_parameters(cameras: Sequence[Camera]) -> list[LensParameter]:
-    """Return the parameters of each lens, with its own sigma (`Lens.sigma`) or that of a good board, and with heat on
-    the focal length."""
+    """Return the parameters of each lens by its own sigma (`Lens.sigma`) or a good board's, and with heat."""
     return [
         replace(p, expected=hypot(p.expected, HEAT_FOCAL * cameras[p.camera].intrinsics.focal_length_px))
         if p.name == "focal_length_px"

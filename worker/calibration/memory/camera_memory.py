@@ -152,8 +152,7 @@ class CameraMemory:
 
     @classmethod
     def from_json(cls, document: Mapping[str, Any]) -> CameraMemory | None:
-        """Return the memory that `to_json` wrote; None for one that another release wrote otherwise or that cannot
-        be read."""
+        """Return the memory that `to_json` wrote; None for one of another format or that cannot be read."""
         if document.get("format") != FORMAT:
             return None
         try:
@@ -177,8 +176,7 @@ def fingerprint(lines: LinePoints) -> str:
 
 
 def fingerprint_of_frames(frames: Sequence[Frame]) -> str:
-    """Return a digest of a job's frames, by every eighth of their rows and columns: no two nights have the same
-    noise."""
+    """Return a digest of a job's frames by every eighth row and column: no two nights have the same noise."""
     digest = hashlib.blake2b(digest_size=8)
     for frame in frames:
         digest.update(np.ascontiguousarray(frame[::8, ::8]).tobytes())

@@ -122,8 +122,7 @@ class Epoch:
 
 
 def _trusted(camera: Camera, measured: Measurements, lines: LinePoints) -> tuple[NDArray[np.intp], Array]:
-    """Return the line points that were measured well, in order, and their offsets (px) from where the camera expects
-    them."""
+    """Return the line points that were measured well, in order, and their offsets (px) by the camera."""
     offset = measured.offset(camera, lines.position[measured.index])
     with np.errstate(invalid="ignore"):
         good = np.isfinite(offset) & (measured.trust >= 0.5)

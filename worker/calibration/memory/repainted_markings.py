@@ -83,8 +83,7 @@ class _Differences:
         return float(np.median(np.abs(self.offset))) if len(self.offset) else np.inf
 
     def explained_by(self, candidates: NDArray[np.intp]) -> dict[int, float]:
-        """Return the markings that have moved, and by how many metres, where camera and focal length may have
-        changed as well."""
+        """Return the markings that have moved, in metres; camera and focal length may have changed too."""
         open_to: dict[int | str, Array] = {"zoomed": self.longer[:, None], "touched": self.jacobian}
         for marking in candidates.tolist():
             open_to[marking] = (self.across * (self.marking == marking))[:, None]
@@ -104,15 +103,13 @@ class _Differences:
         return {name: -float(by[0]) for name, by in zip(taken, parts, strict=False) if isinstance(name, int)}
 
     def _sigma_px(self, columns: Sequence[Array]) -> float:
-        """Return the standard deviation of a difference: of two measurements, or more where even all changes leave
-        more."""
+        """Return the standard deviation of a difference: of two measurements, or more if changes leave more."""
         usual = float(np.hypot(NOISE_PX, NOISE_PX))
         _, change = self._fitted(columns, usual)
         return usual * robust_scale((self.offset + np.concatenate([self.jacobian, *columns], axis=1) @ change) / usual)
 
     def _fitted(self, columns: Sequence[Array], sigma_px: float) -> tuple[float, Array]:
-        """Return Huber's loss and the change (6 + n,) of the pose, by wind, and of `columns` (M, n) in all that
-        minimises it."""
+        """Return Huber's loss and the change (6 + n,) of pose and `columns` (M, n) that minimises it."""
         jacobian = np.concatenate([self.jacobian, *columns], axis=1) / sigma_px
         known = np.eye(POSE_NUMBERS, jacobian.shape[1]) / WIND[:, None]
         tiny = 1e-12

@@ -64,8 +64,7 @@ def find_board(photo: Grey, board: Board) -> BoardDetection | None:
 
 
 def other_size(photo: Grey, board: Board) -> tuple[int, int] | None:
-    """Return the inner corners (columns, rows) of the board in a photo if they were miscounted by one: as squares,
-    usually."""
+    """Return the board's inner corners (columns, rows) in a photo if miscounted by one: as squares, usually."""
     if board.charuco is not None:
         return None
     for columns, rows in ((-1, -1), (1, 1), (0, -1), (-1, 0), (0, 1), (1, 0)):
@@ -86,8 +85,7 @@ def _chessboard(photo: Grey, board: Board) -> BoardDetection | None:
 
 
 def _by_its_quadrangles(photo: Grey, size: tuple[int, int]) -> NDArray[np.float32] | None:
-    """Find a board by OpenCV's older detector, which finds some, with glare or a narrow rim, that the newer one does
-    not."""
+    """Find a board by OpenCV's older detector, which finds some with glare or a narrow rim."""
     # Longer side of the picture in which the old detector looks for a board; it finds big squares only.
     scale = min(1.0, 1600 / max(photo.shape))
     small = cv2.resize(photo, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)

@@ -17,8 +17,7 @@ from worker.calibration.onboarding.point_fit import PointFit, fit
 
 
 def best_exchanges(costs: Array) -> tuple[NDArray[np.intp], Array]:
-    """Return the two labels (P, 2) whose exchange spares each of P poses most, and how much (P,); negative: none spares
-    any.
+    """Return the two labels (P, 2) whose exchange spares each of P poses most, and how much (P,), if positive.
 
     `costs` (P, N, N): what click i costs as the point of click j. To say which two are meant is paid for.
     """

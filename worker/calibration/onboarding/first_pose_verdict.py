@@ -37,8 +37,7 @@ class Click:
 
 @dataclass(frozen=True)
 class FirstPose:
-    """First pose with the evidence for it, and what is wrong with it (`rejected_because`; None: a calibration can begin
-    with it).
+    """First pose, the evidence for it, and what is wrong with it (`rejected_because`; None: it is good enough).
 
     `sigma_px`: rms standard deviation of the pixels of the clicked part of the field. `lens`: None where the camera's
     own was good enough.
@@ -160,8 +159,7 @@ def _rejection(
 
 
 def expected_by_chance(clicks: Clicks, best: PointFit) -> float:
-    """Return the expected number of poses that explain as many clicks as closely, after as many exchanges, if no label
-    were right.
+    """Return the expected number of poses that explain as many clicks as closely if no label were right.
 
     Moisan and Stival, "A probabilistic criterion to detect rigid point matches", IJCV 57, 2004: a pose is proposed by
     any three clicks, up to four times, and of the others any number may fit it.

@@ -194,8 +194,7 @@ class _Chosen:
 def _choose(
     detections: Sequence[BoardDetection], size: tuple[int, int], model: LensModel, report: Callable[[float], None]
 ) -> _Chosen:
-    """Choose the simplest rung that predicts photos as well as the best one, within a standard error of the
-    difference."""
+    """Choose the simplest rung that predicts photos as well as the best one, but for a standard error."""
     tried = []
     for step, rung in enumerate(LADDERS[model]):
         report(step / len(LADDERS[model]))
@@ -321,8 +320,7 @@ def _by_name(values: Array, rung: Rung, lens: Lens) -> dict[str, float]:
 
 
 def _known_to(chosen: _Chosen) -> dict[str, float]:
-    """Return one standard deviation per parameter as a lens names it: the worse of two opinions, both focal lengths
-    apart.
+    """Return one standard deviation per parameter as a lens names it: the worse of two, both focal lengths apart.
 
     A principal point that was left in the middle is known as well as by the simplest lens that has it free.
     """

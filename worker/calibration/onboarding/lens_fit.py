@@ -109,8 +109,7 @@ def _centred(focal: float, size: tuple[int, int]) -> Array:
 def _fisheye_sigma(
     lens: Lens, turns: Sequence[Array], shifts: Sequence[Array], world: Sequence[Array], rung: Rung, off: Array
 ) -> Array:
-    """Return for a fisheye the deviations that `calibrateCameraExtended` gives for a pinhole: the boards' places are
-    eliminated from the normal matrix (Schur)."""
+    """Return a fisheye's deviations, with the boards' places eliminated from the normal matrix (Schur)."""
     names = PARAMETERS["fisheye"]
     free = np.array([name in rung.terms for name in names])
     information = np.zeros((int(free.sum()), int(free.sum())))

@@ -83,8 +83,7 @@ class PointFit:
 
 
 def click_costs(squared_px: Array, noise_px: float, size: tuple[int, int]) -> Array:
-    """Return -2 log likelihood (...) of clicks that are off by the root of `squared_px` (...), doubted ones
-    included."""
+    """Return -2 log likelihood (...) of clicks off by the root of `squared_px` (...), doubted ones included."""
     near = squared_px / noise_px**2 + 2 * np.log(2 * np.pi * noise_px**2)
     return np.minimum(near, anywhere_cost(size))
 
@@ -95,8 +94,7 @@ def anywhere_cost(size: tuple[int, int]) -> float:
 
 
 def fit(clicks: Clicks, start: Camera, free: tuple[str, ...] = ()) -> PointFit:
-    """Return the robust fit nearest to `start`: its pose, and the parameters of its lens that are `free`
-    (`FREE_PARAMETERS`)."""
+    """Return the robust fit nearest to `start`: its pose, and the `free` parameters of its lens (`FREE_PARAMETERS`)."""
     problem = _Problem(clicks, start.intrinsics, free)
     camera, change = start, np.zeros(len(free))
     # Least deviation of a click in the rounds before any click is believed or doubted, in pixels of a 4K frame: a start
@@ -176,16 +174,14 @@ class _Problem:
         return np.linalg.inv(normal + np.diag(weakest)).astype(float)
 
     def median_noise(self, camera: Camera, least: float) -> float:
-        """Return the deviation of a click per axis (px), not below `least` (px of a 4K frame); half of the clicks
-        may be anywhere."""
+        """Return a click's deviation per axis (px), at least `least` (px of a 4K frame), by the median."""
         squared = np.nan_to_num(np.sum(self.off(camera) ** 2, axis=1), nan=np.inf)
         # The median of a distance is 1.18 of either axis's deviation.
         middle = float(np.sqrt(np.median(squared))) / 1.1774
         return float(np.clip(middle, least * self.lens.relative_size, 0.1 * max(self.lens.size)))
 
     def believed(self, camera: Camera, noise: float) -> Array:
-        """Return 1 for clicks (N,) that are likelier where their point is than anywhere in the picture, 0 for
-        others."""
+        """Return 1 for clicks (N,) that are likelier where their point is than anywhere else, 0 for others."""
         squared = np.sum(self.off(camera) ** 2, axis=1)
         costs = click_costs(np.nan_to_num(squared, nan=np.inf), noise, self.lens.size)
         return (costs < anywhere_cost(self.lens.size)).astype(float)

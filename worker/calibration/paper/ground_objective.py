@@ -114,8 +114,7 @@ class GroundObjective:
         return float(self.stitch_weight * stitch + (1 - self.stitch_weight) * single)
 
     def _thickened(self, lines: Picture) -> list[Picture]:
-        """Return, for each blur of a picture (H, W) of lines, 1 where it makes them at least half as high as it
-        should."""
+        """Return, for each blur of lines (H, W), 1 where they are at least half as high as they should be."""
         return [
             _above(cv2.GaussianBlur(coarse, (0, 0), self.blurs.sigma_px, borderType=cv2.BORDER_CONSTANT), half)
             for coarse, half in zip(_pyramid(lines, self.blurs.count), self.half_heights, strict=True)

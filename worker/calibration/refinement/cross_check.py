@@ -39,8 +39,7 @@ class CrossCheck:
 
 
 class CrossChecks:
-    """Split-half posteriors: independent errors by the even and by the odd stretches of tonight's lines, at the prior
-    scales of the full fit.
+    """Split-half posteriors by even and odd stretches of tonight's lines, at the prior scales of the full fit.
 
     Computed on first use: only the refinement whose answer is kept needs it.
     """
@@ -93,8 +92,7 @@ class CrossChecks:
 
 
 def cross_check(pitch: Field, camera: Camera, difference: Array, covariance: Array) -> CrossCheck | None:
-    """Propagate a `difference` (12,) of pose and `LENS_PARAMETERS`, of this covariance (12, 12), to the farthest
-    marking."""
+    """Propagate a `difference` (12,) of pose and `LENS_PARAMETERS`, of a covariance, to the farthest marking."""
     jacobian = full_ground_jacobian(camera, farthest_marking(pitch, camera))
     apart = np.linalg.norm(jacobian @ difference, axis=-1)
     variance = np.einsum("nij,jk,nik->n", jacobian, covariance, jacobian)

@@ -30,8 +30,7 @@ TURN_M = 30.0
 
 @dataclass(frozen=True)
 class Estimate:
-    """Current cameras and field of the refinement, with `values` (E,) of the parameters in them, and `heights` (K,) of
-    the ground.
+    """Current cameras and field of the refinement, parameter `values` (E,) in them, and `heights` (K,) of the ground.
 
     `lines`: the pitch's line points, as many as it had in the beginning; `uneven_m`: a standard deviation of the
     heights.
@@ -110,8 +109,7 @@ class Estimate:
 
 @dataclass(frozen=True)
 class GaussNewtonStep:
-    """Result of a Gauss-Newton step: the estimate it leads `to`, the `move` (U,), and the `covariance` (U, U) before
-    it."""
+    """Result of a Gauss-Newton step `to` an estimate: the `move` (U,), and the `covariance` (U, U) before it."""
 
     to: Estimate
     move: Array

@@ -31,8 +31,7 @@ from worker.calibration.robust import tukey_derivatives, tukey_weights
 
 @dataclass(frozen=True)
 class MarginalInformation:
-    """Information on changes of the dense unknowns (D,) with the ground marginalised: `matrix` (D, D) and `vector`
-    (D,).
+    """Information on changes of the dense unknowns (D,), ground marginalised: `matrix` (D, D), `vector` (D,).
 
     `ground_mean` (K,) and `ground_gain` (K, D): the heights of the ground are `ground_mean - ground_gain @ changes`.
     `repeatability_covariance`: of tonight's poses by tonight's measurement alone.

@@ -109,8 +109,7 @@ def _by_parameters(
 def rows_of(
     positions: Array, cameras: Sequence[Camera], measured: Sequence[Measurements], unknowns: Unknowns
 ) -> list[Rows]:
-    """Return the rows of all views that have enough measurements; `positions` (N, 3): places of the field's line
-    points."""
+    """Return the rows of all views that have enough measurements; `positions` (N, 3) of the field's line points."""
     return [
         Rows.of(positions, camera, view, found, unknowns)
         for view, (camera, found) in enumerate(zip(cameras, measured, strict=True))
@@ -270,8 +269,7 @@ def _by_node(ground: Ground, points: NDArray[np.intp], values: Array) -> Array:
 
 
 def _between_nodes(ground: Ground, points: NDArray[np.intp], values: Array) -> Array:
-    """Return the sum (K, K) over line points (P,) of a value (P,) times the outer square of their shares of the
-    nodes."""
+    """Return the sum (K, K) over line points (P,) of a value (P,) times the outer square of their shares."""
     node, share, size = ground.node[points], ground.share[points], len(ground)
     pair = node[:, :, None] * size + node[:, None, :]
     squares = values[:, None, None] * share[:, :, None] * share[:, None, :]

@@ -82,8 +82,7 @@ class Sigma:
 
     @classmethod
     def from_covariance(cls, covariance: Array) -> Sigma:
-        """Return the roots of the summed variances of each three of a covariance (6, 6) of (rotation rad, position
-        m)."""
+        """Return the roots of the summed variances of a covariance (6, 6) of (rotation rad, position m)."""
         variances = np.diag(covariance)
         return cls(float(np.degrees(np.sqrt(variances[:3].sum()))), float(np.sqrt(variances[3:].sum())))
 

@@ -13,8 +13,7 @@ from worker.calibration.geometry.parameters import FieldParameter, LensParameter
 
 @dataclass(frozen=True)
 class Unknowns:
-    """Poses of V views, E parameters of lenses and field, and K heights of the ground, in this order: U unknowns in
-    all.
+    """Poses of V views, E parameters of lenses and field, K heights of the ground, in this order: U unknowns.
 
     A view is a camera at one time: tonight, or in a memory of earlier nights. `lenses[v]`: the `camera` numbers of the
     `LensParameter`s that the lens of view v has; by default its own number alone.
@@ -27,8 +26,7 @@ class Unknowns:
 
     @property
     def dense(self) -> int:
-        """Number 6 V + E of poses and parameters, each of which touches many lines; a height touches those around
-        its node."""
+        """Number 6 V + E of poses and parameters, which touch many lines, as a height does not."""
         return POSE_NUMBERS * self.views + len(self.parameters)
 
     def pose(self, view: int) -> slice:

@@ -44,8 +44,7 @@ def _agreement(field: FieldMap, view: LineView, cameras: Hypotheses, tolerance: 
 def _expected_and_found(
     field: FieldMap, view: LineView, cameras: Hypotheses, tolerance: float
 ) -> tuple[Array, Array, Array]:
-    """Return, for each hypothesis, length of line in view, length of it that is painted (view pixels), and number of
-    points."""
+    """Return, per hypothesis, length of line in view, painted length (view pixels), number of points."""
     rotations = cameras.rotations.astype(np.float32)
     focal = cameras.focal_px.astype(np.float32)[:, None]
     moved = rotations @ field.points.T - (rotations @ cameras.positions[..., None].astype(np.float32))
@@ -93,8 +92,7 @@ def _explained(field: FieldMap, view: LineView, cameras: Hypotheses, tolerance: 
 
 
 def straightened(places: NDArray[np.float32], bends: Array) -> NDArray[np.float32]:
-    """Return places (M, 2) of the view with each of the bends (P,) undone: (P, M, 2), by a Newton step from a first
-    guess."""
+    """Return places (M, 2) of the view with each of the bends (P,) undone, (P, M, 2), by a Newton step."""
     if not bends.any():
         return places[None]
     # A place that was `scale` times as far from the centre has scale (1 + bent scale²) = 1.

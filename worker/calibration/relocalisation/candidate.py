@@ -73,8 +73,7 @@ class FrameObservations:
         return self.assessed(refine(self.field, [camera], self.observations, 0.0, lens).each[0], sought)
 
     def on_lines_farther_off(self, camera: Camera, close: Candidate, sought: SoughtCamera) -> Candidate:
-        """Refine a proposed camera onto lines farther off; return it if it is better than `close`, by the lines
-        close by."""
+        """Refine a proposed camera onto lines farther off; return that if better than `close`."""
         # A pose that sees less has none near that sees more, as a rule; one that sees more is left as it is.
         if not 0.3 < close.evidence.agreement < 0.9:
             return close
@@ -89,8 +88,7 @@ class FrameObservations:
         return far if is_better(far, close) else close
 
     def assessed(self, found: RefinedPose, sought: SoughtCamera) -> Candidate:
-        """Assess a refined camera by lines and paint of the frame, and note the uncertainty of a lens that was
-        sought."""
+        """Assess a refined camera by lines and paint, and note the uncertainty of a lens that was sought."""
         if sought.is_lens_sought:
             found = replace(found, camera=_with_sigmas(found))
         explains = self.paint.on_markings(self.field, found.camera)

@@ -31,8 +31,7 @@ class CrownedField:
 def find_crown(
     flat: Field, sought: Sequence[SoughtCamera], candidates: Sequence[Candidate], observations: Observations
 ) -> CrownedField | None:
-    """Fit the height of a ridge to the lines of all cameras; return the field and cameras with it, None: it may be
-    flat.
+    """Fit the height of a ridge to the lines of all cameras; return field and cameras with it, or None.
 
     `candidates`: the result on the `flat` field for each camera that was `sought`; `observations`: of the same cameras.
     A lens that was given stays.

@@ -15,8 +15,7 @@ from worker.calibration.relocalisation.sought import Place
 
 @dataclass(frozen=True)
 class ChosenSide:
-    """Camera on the side that it is taken to stand on; `remark`: why, in words; `decided`: True unless both sides
-    are as good."""
+    """Camera on the side it is taken to stand on; `remark`: why; `decided`: True unless both sides are as good."""
 
     camera: Camera
     remark: str | None

@@ -16,8 +16,7 @@ from worker.calibration.relocalisation.line_view import labelled_places
 
 @dataclass(frozen=True)
 class FieldMap:
-    """Points (N, 3) m along the markings, `points`; `joined` (N,): True where the next point continues the same
-    marking.
+    """Points (N, 3) m along the markings; `joined` (N,): True where the next point continues the same marking.
 
     `nearest` (rows, columns, 2): from the nearest paint to each cell of the ground, m; the cell of row 0, column 0 has
     its centre at `origin` (2,) m and cells are `cell_m` wide. `lines_along_x`: y (m) of the straight lines that run

@@ -62,8 +62,7 @@ LENS_KNOWN, FOCAL_SOUGHT, LENS_SOUGHT = LensSteps(0.0, 0.0), LensSteps(0.08, 0.0
 
 
 def rotations_of(pan: Array, tilt: Array, roll: Array) -> Array:
-    """Return rotations (..., 3, 3), world to camera: `pan` of the view from x towards y, `tilt` below the horizon,
-    rad."""
+    """Return rotations (..., 3, 3), world to camera: `pan` from x towards y, `tilt` below the horizon, rad."""
     zero = np.zeros_like(pan)
     forward = np.stack([np.cos(tilt) * np.cos(pan), np.cos(tilt) * np.sin(pan), -np.sin(tilt)], axis=-1)
     right = np.stack([np.sin(pan), -np.cos(pan), zero], axis=-1)

@@ -90,8 +90,7 @@ def _matched(
 
 
 def _heights_and_places(measures: Array, markings: Array) -> Array:
-    """Return heights and places (n, 2) that put two lines on two markings, or one line on one marking from a usual
-    height."""
+    """Return heights and places (n, 2) that put two lines, or one from a usual height, on markings."""
     markings_of_pairs = _ordered_pairs(markings)
     lines_of_pairs = np.array(list(combinations(measures, 2))).reshape(-1, 2)
     apart = markings_of_pairs[:, 0] - markings_of_pairs[:, 1]

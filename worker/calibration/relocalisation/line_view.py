@@ -83,8 +83,7 @@ class LineView:
         return np.asarray(np.linalg.norm(self.ends - self.starts, axis=1))
 
     def to_paint(self, places: Array) -> tuple[Array, NDArray[np.bool_]]:
-        """Return the vectors from places (..., 2) to the nearest paint, view pixels, and True for places in the
-        frame."""
+        """Return the vectors from places (..., 2) to the nearest paint, view pixels, and True inside the frame."""
         height, width = self.covered.shape
         at = places - self.corner
         column, row = (

@@ -88,8 +88,7 @@ def _drawn(field: FieldMap, focal: Array, roll_sigma: float, place: Place, rng: 
 
 
 def _with_neighbours(directions: list[Direction], rng: np.random.Generator) -> list[Direction]:
-    """Return the directions, and some around the best ones: votes of a strongly bent or noisy picture are off by a
-    degree."""
+    """Return the directions, and some around the best ones: votes of a noisy picture are off by a degree."""
     return directions + [
         replace(one, pan_tilt_roll=one.pan_tilt_roll + np.radians((1.5, 1.5, 0.5)) * rng.normal(size=3))
         for one in directions[:6]
@@ -98,8 +97,7 @@ def _with_neighbours(directions: list[Direction], rng: np.random.Generator) -> l
 
 
 def _at(place: Place, field: FieldMap, cameras: Hypotheses) -> Hypotheses:
-    """Return the cameras that stand where they may, on a symmetric field after half a turn of it where that is
-    needed."""
+    """Return the cameras that stand where they may, on a symmetric field after half a turn of it if needed."""
     if place.is_anywhere:
         return cameras
     here = place.allows(cameras.positions)

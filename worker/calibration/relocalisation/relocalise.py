@@ -60,8 +60,7 @@ class NotFound:
 
 @dataclass(frozen=True)
 class Relocalisation:
-    """Result for one camera: candidates, the best first; `refusal`: why the best one is not taken, None where it is;
-    `remarks`: the assumptions made."""
+    """Candidates for one camera, the best first; why that is refused, or None; and the assumptions made."""
 
     candidates: Sequence[Candidate]
     refusal: NotFound | None
@@ -143,8 +142,7 @@ def _distinct(
 def why_not_taken(
     field: Field, markings: FieldMap, sought: SoughtCamera, candidates: Sequence[Candidate]
 ) -> NotFound | None:
-    """Return why the best candidate is not taken, None if it is; a calibration that begins with it judges its
-    exactness."""
+    """Return why the best candidate is not taken, None if it is; a calibration will judge its exactness."""
     if not candidates:
         return NotFound("no-lines", "no lines of a field are seen in the frame; is the view free and lit?")
     best, *others = candidates
@@ -212,8 +210,7 @@ def rivals(field: Field, markings: FieldMap, best: Candidate, others: Iterable[C
 
 
 def _is_likely_in_place(sought: SoughtCamera, best: Candidate) -> bool:
-    """True if a camera turned on its mount is found, which needs fewer of its lines than one that may stand
-    anywhere."""
+    """True if a camera is found turned on its mount, which needs fewer of its lines than one anywhere."""
     if sought.place.position is None or sought.is_lens_sought:
         return False
     # There are few other poses from which it could be.
@@ -281,8 +278,7 @@ def _differ(field: Field, markings: FieldMap, one: Camera, other: Camera, apart:
 
 
 def mean_shift_px(field: Field, markings: FieldMap, one: Camera, other: Camera, unseen_px: float) -> float:
-    """Return the mean distance (px) between the markings in view of one camera by it and by another; NaN where none is
-    in view.
+    """Return the mean distance (px) of the markings in view of one camera by it and another; NaN without any.
 
     On a symmetric field it is the nearer of the other camera and its twin. Markings that that does not see count as
     `unseen_px` off.

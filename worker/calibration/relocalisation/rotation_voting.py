@@ -102,8 +102,7 @@ def _climbed(view: LineView, start: Direction, frees_focal: bool, rng: np.random
 
 
 def _votes(view: LineView, pan_tilt_roll: Array, focal: float, tolerance: float) -> Array:
-    """Return, for each direction (P, 3), the share of the length of all segments that runs along x or y, less for
-    its roll."""
+    """Return, for each direction (P, 3), the share of all segments that runs along x or y, less for its roll."""
     rotations = rotations_of(*pan_tilt_roll.T).astype(np.float32)
     normals = view.normals(focal).astype(np.float32)
     lengths = view.lengths

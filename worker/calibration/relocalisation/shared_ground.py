@@ -84,8 +84,7 @@ class SharedGround:
         return GroundComparison(alike.max(axis=1), [list(seen)[number] for number in alike.argmax(axis=1)])
 
     def _texture(self, camera: Camera) -> _Texture:
-        """Return the texture that a frame shows if its camera has this pose and lens; each such pair is computed
-        once."""
+        """Return the texture that a frame shows by this pose and lens; each such pair is computed once."""
         pose, lens = camera.pose, camera.intrinsics
         numbers = np.concatenate([pose.rotation, pose.position, lens.matrix.ravel(), lens.distortion])
         key = camera.id, numbers.tobytes()
@@ -122,8 +121,7 @@ class _Texture:
 
 
 def _least_px(pixels: Array) -> Array:
-    """Return the least distance (H, W) in a frame between neighbouring places at pixels (H, W, 2), in the direction
-    where it is smallest; or 0."""
+    """Return the least distance (H, W) in a frame between neighbouring places at pixels (H, W, 2), any way; or 0."""
     (x_down, x_right), (y_down, y_right) = (np.gradient(pixels[..., axis]) for axis in (0, 1))
     # The smaller singular value of the derivatives.
     total = x_down**2 + x_right**2 + y_down**2 + y_right**2

@@ -55,8 +55,7 @@ class SoughtLens:
 
 @dataclass(frozen=True)
 class Place:
-    """Possible places of a camera: on a `side` of the field, and within `radius_m` of a `position` (3,) m, or
-    anywhere."""
+    """Possible places of a camera: on a `side` of the field, and within `radius_m` of a `position` (3,) m, or any."""
 
     side: Side | None = None
     position: Array | None = None

@@ -56,8 +56,7 @@ def coverage_picture(found: LensCalibration) -> Frame:
 
 
 def clicks_picture(pitch: Field, clicks: Clicks, found: FirstPose, frame: Frame | None) -> Frame:
-    """Draw the field as the first pose has it, over the frame if there is one, and each click with where its label
-    is."""
+    """Draw the field by the first pose, over the frame if there is one, and each click with its label's place."""
     width, height = found.camera.intrinsics.size
     picture = np.full((height, width, 3), PAPER, np.uint8) if frame is None else frame.copy()
     thick = max(1, round(width / 1500))
@@ -88,7 +87,6 @@ def _cross(picture: Frame, place: Array, colour: tuple[int, int, int], arm: int)
 
 
 def _fixed(place: Array) -> tuple[int, int]:
-    """Return sub-pixel places as OpenCV's drawing takes them, with four bits behind the point; far outside is far
-    enough."""
+    """Return sub-pixel places as OpenCV's drawing takes them, with four bits behind the point, and clipped."""
     x, y = np.rint(np.clip(place, -1e5, 1e5) * 16).astype(int).tolist()
     return x, y

@@ -64,8 +64,7 @@ def _thickness(part: float, size: tuple[int, int]) -> int:
 
 
 def _strokes(camera: Camera, lines: Sequence[Array], size: tuple[int, int], thickness: int) -> NDArray[np.uint8]:
-    """Return the coverage (height, width) in 0..255 of lines (n, 2) in a camera's pixels, at the scale of a smaller
-    picture."""
+    """Return the coverage (height, width) in 0..255 of lines (n, 2) in a camera's pixels, in a smaller picture."""
     coverage = np.zeros((size[1], size[0]), np.uint8)
     scale = np.array(size) / np.array(camera.intrinsics.size)
     for line in lines:

@@ -20,8 +20,7 @@ NOWHERE = -1.0
 
 
 def undistorting(lens: Lens) -> StMap:
-    """Return, for each pixel of the picture without distortion, where to sample the frame: (height, width, 2), see
-    `_st_map`."""
+    """Return, per pixel of the picture without distortion, where to sample the frame (H, W, 2); see `_st_map`."""
     inverse = np.linalg.inv(lens.matrix)
 
     def sample(pixels: Array) -> Array:
@@ -31,8 +30,7 @@ def undistorting(lens: Lens) -> StMap:
 
 
 def distorting(lens: Lens) -> StMap:
-    """Return, for each pixel of the frame, where to sample the picture without distortion: (height, width, 2), see
-    `_st_map`."""
+    """Return, per pixel of the frame, where to sample the undistorted picture (H, W, 2); see `_st_map`."""
 
     def sample(pixels: Array) -> Array:
         return _linear(lens.matrix, lens.undistort(pixels))
@@ -41,8 +39,7 @@ def distorting(lens: Lens) -> StMap:
 
 
 def _st_map(size: tuple[int, int], sample: Callable[[Array], Array]) -> StMap:
-    """Return (x + 0.5) / width and (y + 0.5) / height of the pixel to sample: 0..1 from the outer corner at the top
-    left.
+    """Return (x + 0.5) / width and (y + 0.5) / height of the pixel to sample: 0..1 from the top left corner.
 
     Pixel centres are at integers, as everywhere in the engine.
     """

@@ -21,8 +21,7 @@ NOT_KNOWN: Mapping[str, Light] = MappingProxyType({})
 
 @dataclass(frozen=True)
 class Stitched:
-    """Picture stitched from all cameras, BGR (H, W, 3); `owner` (H, W): number of the camera that counts most, or
-    -1."""
+    """Picture stitched from all cameras, BGR (H, W, 3); `owner` (H, W): camera that counts most, or -1."""
 
     picture: Frame
     owner: NDArray[np.int8]
@@ -71,7 +70,6 @@ def _made(
     frames: Mapping[str, Frame],
     evened: Mapping[str, Light],
 ) -> Panorama:
-    """Return the panorama with seams in the middle between cameras, where wrong poses show, and not where they would
-    be seen least."""
+    """Return the panorama with seams in the middle between cameras, where wrong poses show."""
     lights = evened or evened_out(pitch, cameras, frames)
     return panorama(pitch, view, cameras, {camera: replace(light, reach=0.0) for camera, light in lights.items()})

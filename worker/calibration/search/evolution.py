@@ -41,8 +41,7 @@ class EvolutionStrategy:
         self.losses = np.empty(0)
 
     def first_parents(self, centre: Array, strength: float = 1.0) -> Array:
-        """Return the first generation (parents, genes): copies of `centre` (genes,) mutated, the first one left as
-        it is."""
+        """Return the first generation (parents, genes): `centre` (genes,), and mutated copies of it."""
         genomes = centre + strength * self.mutation * self.rng.normal(size=(self.parents, len(centre)))
         genomes[0] = centre
         return genomes

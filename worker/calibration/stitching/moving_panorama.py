@@ -26,8 +26,7 @@ VIEW_BORDER = 0.025
 
 
 class MovingPanorama:
-    """Panorama of a view whose parts lie where `cameras` are the references of a clip; `at` is that of other
-    moments."""
+    """Panorama of a view by `cameras`, the references of a clip; `at` is that of other moments."""
 
     def __init__(
         self, pitch: Field, view: StitchedView, cameras: Sequence[Camera], lights: Mapping[str, Light] | None = None

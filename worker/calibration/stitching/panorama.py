@@ -72,8 +72,7 @@ class Panorama:
         return np.where(self.seen, best, -1).astype(np.int8)
 
     def picture(self, frames: Mapping[str, Frame]) -> Frame:
-        """Return the view (H, W, 3) of one frame of each camera, blue, green, red, each of the size of its camera's
-        frames."""
+        """Return the view (H, W, 3), BGR, of one frame of each camera, of the size of its camera's frames."""
         width, height = self.size
         total = np.full((height, width, 3), BACKDROP, np.float32)
         total[self.seen] = 0
@@ -118,8 +117,7 @@ def panorama(
 
 
 def seam_weights(qualities: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return weights (cameras, H, W) that sum to 1 where any camera sees, from how well each does: the best one,
-    feathered."""
+    """Return weights (cameras, H, W) that sum to 1 where any camera sees: the best one's, feathered."""
     # Power of how well a camera sees: a short feather, so that players who stand off the ground do not become ghosts.
     relative = (qualities / np.maximum(qualities.max(axis=0), 1e-30)) ** 60
     relative /= np.maximum(relative.sum(axis=0), 1e-30)

@@ -25,8 +25,7 @@ UNKNOWNS = 5
 
 
 def evened_out(pitch: Field, cameras: Sequence[Camera], frames: Mapping[str, Frame]) -> dict[str, Light]:
-    """Return the corrections that make the cameras agree where they overlap, by camera; none for one that overlaps no
-    other.
+    """Return the corrections that make the cameras agree where they overlap, by camera, if it overlaps any.
 
     Least squares of the logarithms of what two cameras show of the same places, robust to players and to whatever
     stands off the ground; held near no correction at all, so that only differences follow the pictures. The seams then
@@ -53,8 +52,7 @@ def evened_out(pitch: Field, cameras: Sequence[Camera], frames: Mapping[str, Fra
 
 @dataclass(frozen=True)
 class _Seen:
-    """Picture of places (H, W) by a camera: logarithms (H, W, 3), mask of valid ones, squared distances from the
-    middle of its frame, and how well it sees there."""
+    """Logarithms (H, W, 3) of places by a camera, where valid; squared distances from the middle; how well it sees."""
 
     logs: NDArray[np.float32]
     valid: NDArray[np.bool_]

@@ -40,8 +40,7 @@ class Light:
         return np.exp(np.float32(self.falloff) * squared_radius(pixels, size))
 
     def after(self, before: Light | None) -> Light:
-        """Return the correction smoothed with the one `before`: a cloud moves a picture by a part of what it moved
-        the light."""
+        """Return the correction smoothed with the one `before`: a cloud moves only a part of it."""
         if before is None:
             return self
         old, new = before.numbers, self.numbers

@@ -261,8 +261,7 @@ def _stand(cameras: Sequence[Camera], seen: Sequence[Array]) -> Pose:
 def _window(
     pitch: Field, aim: LevelView, cameras: Sequence[Camera], seen: Array, border: float
 ) -> tuple[float, float, float, float]:
-    """Return left, right, top, bottom of the view in the picture plane of `aim`: the field, and around it what is
-    seen."""
+    """Return left, right, top, bottom of the view in the plane of `aim`: the field, and around it what is seen."""
     on_plane = aim.project(seen)
     widest = _borders(aim, WIDEST_DEG[aim.projection])
     within = (on_plane[:, 0] > widest[0]) & (on_plane[:, 0] < widest[1])

@@ -42,8 +42,7 @@ class LearnedOffsets:
         return self._information > 0.01 * self._by_sight
 
     def are_seen_as_often(self, share: float) -> NDArray[np.bool_]:
-        """True for pieces (N,) that have been seen of late at least `share`, 0..1, as often as the one that was seen
-        most."""
+        """True for pieces (N,) seen of late at least `share`, 0..1, as often as the one seen most."""
         return self._information >= share * self._information.max()
 
     def learn(self, pieces: NDArray[np.intp], offsets: Array) -> None:

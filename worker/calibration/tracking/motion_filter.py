@@ -67,8 +67,7 @@ class State:
         return self.with_observed(PoseObservation(np.zeros(POSE_NUMBERS), information))
 
     def squared_innovation(self, observed: PoseObservation) -> float:
-        """Return the squared innovation in its own standard deviations: about the number of observed directions, if
-        all is well."""
+        """Return the squared innovation in its standard deviations: about the number of observed directions."""
         innovation, root, innovation_covariance = self._innovation(observed)
         return float(innovation @ root @ np.linalg.solve(innovation_covariance, root.T @ innovation))
 

@@ -9,8 +9,7 @@ from worker.calibration.geometry.camera import Array
 
 
 def most_telling(jacobian: Array, patch: NDArray[np.intp], prior: Array, count: int) -> NDArray[np.intp]:
-    """Return indices, rising, of up to `count` of N pieces that together leave least open of a pose (D-optimal,
-    greedily).
+    """Return indices, rising, of up to `count` of N pieces that leave least open of a pose (D-optimal, greedily).
 
     `jacobian` (N, 6): how far each moves, in its own standard deviation, per unit of the pose; `patch` (N,): pieces of
     one err together, so each further one of a patch counts for less; `prior` (6, 6): information without any piece.
