@@ -25,9 +25,10 @@ from worker.calibration.gate.quality import in_one_sentence
 from worker.calibration.geometry.camera import Array, Camera, Frame
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.visibility import VisibleLines
+from worker.calibration.problem import ObservedCameras, Problem
 from worker.calibration.records import CalibrationError, ProgressReporter, Segment
 from worker.calibration.refinement.refine import Observations
-from worker.calibration.solve import CAPTURE_RAD, ObservedCameras, Problem
+from worker.calibration.steps import CAPTURE_RAD
 
 FEWEST_VISIBLE_POINTS = 60
 """Line points (25 cm apart) a stored pose has to see; less cannot fix a pose."""

@@ -23,10 +23,11 @@ from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.derivatives import POSE_NUMBERS
 from worker.calibration.geometry.visibility import VisibleLines
 from worker.calibration.observe import FrameObserver
+from worker.calibration.problem import Problem
 from worker.calibration.records import ProgressReporter
 from worker.calibration.refinement.least_squares import CLUSTER_POINTS
 from worker.calibration.refinement.priors import MOVED_M, MOVED_RAD
-from worker.calibration.solve import Problem, network_responses, search_poses
+from worker.calibration.steps import network_responses, search_poses
 
 COMPARED_WIDTH_PX = 1280
 """Width of the frames in which colours are compared. Lines are wide enough to show their paint, and which is the
@@ -39,7 +40,7 @@ SURE_NATS = float(np.log(1000))
 
 @dataclass(frozen=True)
 class _Explanation:
-    """Where a search in overviews finds the `cameras`, in frames that show some colours only."""
+    """Result of a search in overviews: the `cameras`, in frames that show some colours only."""
 
     problem: Problem
     cameras: Sequence[Camera]

@@ -13,7 +13,7 @@ from service.store.jobs.files import names_of_all
 from worker.calibration import records as engine
 from worker.calibration.calibrate import calibrate
 from worker.calibration.detection.view_condition import UsualView
-from worker.calibration.gate.quality import Gate
+from worker.calibration.gate.quality import GATE
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.parameters import field_measures
 from worker.calibration.memory.camera_memory import CameraMemory, memories_of_field
@@ -180,7 +180,7 @@ def _result(
         warnings=[*venue.lens_warnings, *warnings],
         stitch_error_px=finite_or_none(found.stitch_error_px),
         stitch_error_before_px=finite_or_none(found.stitch_error_before_px),
-        stitch_error_limit_px=Gate().largest_stitch_error_px,
+        stitch_error_limit_px=GATE.largest_stitch_error_px,
         pairs=[pair_to_schema(*pair) for pair in found.pairs],
         loss=finite_or_none(found.loss),
         generations=found.generations,

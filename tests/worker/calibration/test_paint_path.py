@@ -14,8 +14,8 @@ from worker.calibration.detection.segmentation import Segmenter
 from worker.calibration.gate.quality import Moved
 from worker.calibration.geometry.field import Field
 from worker.calibration.paint_path import log_odds
+from worker.calibration.problem import Problem
 from worker.calibration.records import Options
-from worker.calibration.solve import Problem
 
 pytestmark = pytest.mark.slow
 

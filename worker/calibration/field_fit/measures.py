@@ -12,16 +12,17 @@ from typing import Literal, cast
 
 import numpy as np
 
-from worker.calibration.calibrate import judge_together
 from worker.calibration.field_fit.ridge_length import TriedRidges, try_ridges
 from worker.calibration.geometry.camera import Camera, Frame
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.parameters import FieldMeasure, LensParameter, Parameter, free_field
+from worker.calibration.joint_verdict import judge_together
 from worker.calibration.observe import FrameObserver
+from worker.calibration.problem import Problem
 from worker.calibration.records import EngineResult, Options, Progress, ProgressReporter, Segment
 from worker.calibration.refinement.refine import SEARCH_PX, Observations, refine
 from worker.calibration.refinement.uncertainty import ParameterUncertainty, RefinedPoses
-from worker.calibration.solve import Problem, judge_each
+from worker.calibration.steps import judge_each
 from worker.calibration.wide_path import search_and_refine
 
 TOLD = 0.25

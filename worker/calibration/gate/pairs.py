@@ -19,7 +19,7 @@ from worker.calibration.diagnostics.registration import (
     register_pair,
     shares_plenty,
 )
-from worker.calibration.gate.quality import Gate, Reason, Refusal
+from worker.calibration.gate.quality import GATE, Reason, Refusal
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.field import Field
 
@@ -62,24 +62,24 @@ class Pair:
         """Ids of both cameras."""
         return self.first, self.second
 
-    def agrees(self, gate: Gate) -> bool:
+    def agrees(self) -> bool:
         """Return whether the two cameras confirm each other.
 
         Where far grass moves by less than a pixel of either frame, neither tells its place any better.
         """
-        is_near = self.error_px is not None and self.error_px <= gate.largest_stitch_error_px
-        return is_near or self.shift_px <= gate.largest_ground_sigma_px
+        is_near = self.error_px is not None and self.error_px <= GATE.largest_stitch_error_px
+        return is_near or self.shift_px <= GATE.largest_ground_sigma_px
 
     @property
     def missed(self) -> bool:
         """True if the views should register and do not."""
         return self.error_px is None and self.plenty and not self.confirmed
 
-    def disagrees(self, gate: Gate) -> bool:
+    def disagrees(self) -> bool:
         """True if the cameras contradict each other. Two that share too little to be compared do neither."""
-        return self.missed or (self.error_px is not None and not self.agrees(gate))
+        return self.missed or (self.error_px is not None and not self.agrees())
 
-    def words(self, gate: Gate) -> str:
+    def words(self) -> str:
         """Return the contradiction in words, and what to do."""
         both = f"{self.first} and {self.second}"
         if self.error_px is None:
@@ -88,8 +88,8 @@ class Pair:
             )
         return (
             f"the cameras {both} do not fit each other: stitch error {self.error_px:.2f} px, at most "
-            f"{gate.largest_stitch_error_px} allowed, which is {self.shift_px:.1f} px of a frame, at most "
-            f"{gate.largest_ground_sigma_px} allowed; look at the preview, and check intrinsics and ridge"
+            f"{GATE.largest_stitch_error_px} allowed, which is {self.shift_px:.1f} px of a frame, at most "
+            f"{GATE.largest_ground_sigma_px} allowed; look at the preview, and check intrinsics and ridge"
         )
 
 
@@ -100,10 +100,10 @@ class Contradiction:
     pair: Pair
     blamed: Sequence[str]
 
-    def words(self, gate: Gate) -> str:
+    def words(self) -> str:
         """Return the contradiction in words, naming the camera to blame where it is one of them."""
         whose = f"camera {self.blamed[0]}: " if len(self.blamed) == 1 else ""
-        return whose + self.pair.words(gate)
+        return whose + self.pair.words()
 
 
 def compare_pairs(pitch: Field, cameras: Sequence[CameraResponse]) -> list[Pair]:
@@ -144,7 +144,7 @@ def _register_lines(pitch: Field, first: CameraResponse, second: CameraResponse)
     )
 
 
-def measured_by_lines(pitch: Field, pairs: Sequence[Pair], cameras: Sequence[CameraResponse], gate: Gate) -> list[Pair]:
+def measured_by_lines(pitch: Field, pairs: Sequence[Pair], cameras: Sequence[CameraResponse]) -> list[Pair]:
     """Return the pairs, those that agree with the error by the lines measured in both views.
 
     So the error means the same whether or not the network has looked in full, and lines are measured finer than
@@ -154,11 +154,11 @@ def measured_by_lines(pitch: Field, pairs: Sequence[Pair], cameras: Sequence[Cam
     found = []
     for pair in pairs:
         both = [by_id[camera] for camera in pair.cameras]
-        lines = _register_lines(pitch, *both) if pair.agrees(gate) else None
+        lines = _register_lines(pitch, *both) if pair.agrees() else None
         if lines is not None:
             shift_px = _shift_px(pitch, lines, [one.camera for one in both])
             finer = replace(pair, error_px=lines.error_px, registration=lines, shift_px=shift_px)
-            pair = finer if finer.agrees(gate) else pair
+            pair = finer if finer.agrees() else pair
         found.append(pair)
     return found
 
@@ -185,35 +185,35 @@ def _both_see(first: Evidence, second: Evidence) -> bool:
     return len(a) > 0 and float(np.mean(first.found[a] & second.found[b])) >= 0.6
 
 
-def find_contradictions(pairs: Sequence[Pair], gate: Gate) -> list[Contradiction]:
+def find_contradictions(pairs: Sequence[Pair]) -> list[Contradiction]:
     """Return the pairs that disagree and the cameras to blame: those that agree with nobody, or else both.
 
     Two that both agree with others contradict each other only where they share plenty and can be compared.
     """
-    confirmed = {camera for pair in pairs if pair.agrees(gate) for camera in pair.cameras}
+    confirmed = {camera for pair in pairs if pair.agrees() for camera in pair.cameras}
     found = []
     for pair in pairs:
         loose = [camera for camera in pair.cameras if camera not in confirmed]
-        if pair.disagrees(gate) and (loose or (pair.plenty and pair.error_px is not None)):
+        if pair.disagrees() and (loose or (pair.plenty and pair.error_px is not None)):
             found.append(Contradiction(pair, loose or pair.cameras))
     return found
 
 
-def refusal_by_pairs(camera: str, against: Sequence[Contradiction], gate: Gate) -> Refusal | None:
+def refusal_by_pairs(camera: str, against: Sequence[Contradiction]) -> Refusal | None:
     """Return the refusal of a camera that pairs contradict, None where none does."""
     contradicting = [one.pair for one in against if camera in one.blamed]
     if not contradicting:
         return None
     reason: Reason = "not-together" if contradicting[0].error_px is None else "disagree"
-    return Refusal(reason, "; ".join(pair.words(gate) for pair in contradicting))
+    return Refusal(reason, "; ".join(pair.words() for pair in contradicting))
 
 
-def stitch_error_px(pairs: Sequence[Pair], gate: Gate) -> float | None:
+def stitch_error_px(pairs: Sequence[Pair]) -> float | None:
     """Return the worst disagreement of pairs that confirm or contradict each other.
 
     None if none does, or if one cannot be registered that should be.
     """
-    telling = [pair for pair in pairs if pair.agrees(gate)] + [one.pair for one in find_contradictions(pairs, gate)]
+    telling = [pair for pair in pairs if pair.agrees()] + [one.pair for one in find_contradictions(pairs)]
     if any(pair.missed for pair in telling):
         return None
     return max((pair.error_px for pair in telling if pair.error_px is not None), default=None)

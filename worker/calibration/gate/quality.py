@@ -59,6 +59,8 @@ class Gate:
         return seen.by_chance + self.least_agreement * max(1 - seen.by_chance, LEAST_ROOM)
 
 
+GATE = Gate()
+
 Reason = Literal[
     "view",
     "other-camera",
@@ -102,19 +104,20 @@ class Moved:
         shift = shift[np.isfinite(shift)]
         return cls(
             float(rotation_angles_deg(before.pose.rotation, after.pose.rotation)),
-            float(np.linalg.norm(after.pose.position - before.pose.position)),
+            before.distance_m(after),
             float(shift.mean()) if len(shift) else 0.0,
         )
 
-    def beyond(self, gate: Gate) -> bool:
+    @property
+    def exceeds_limits(self) -> bool:
         """True if the change is larger than is allowed without somebody storing a new pose."""
-        return self.rotation_deg > gate.largest_rotation_deg or self.position_m > gate.largest_shift_m
+        return self.rotation_deg > GATE.largest_rotation_deg or self.position_m > GATE.largest_shift_m
 
-    def words(self, gate: Gate) -> str:
+    def words(self) -> str:
         """Return the change in words, and the limits."""
         return (
-            f"turned by {self.rotation_deg:.1f} degrees (at most {gate.largest_rotation_deg} allowed) and moved by "
-            f"{self.position_m:.2f} m (at most {gate.largest_shift_m})"
+            f"turned by {self.rotation_deg:.1f} degrees (at most {GATE.largest_rotation_deg} allowed) and moved by "
+            f"{self.position_m:.2f} m (at most {GATE.largest_shift_m})"
         )
 
 
@@ -160,39 +163,37 @@ def in_one_sentence(reasons: Sequence[str]) -> str:
     return "; ".join([*(reason.removesuffix(".") for reason in before), last]).replace("?; ", "? ")
 
 
-def credible_deviations(
-    deviations: Sequence[Deviation], results: Sequence[CameraResult], gate: Gate
-) -> list[Deviation]:
+def credible_deviations(deviations: Sequence[Deviation], results: Sequence[CameraResult]) -> list[Deviation]:
     """Return the deviations that were read off cameras which see the field where they expect it."""
-    lost = {result.camera.id for result in results if result.evidence.agreement < gate.least_agreement}
+    lost = {result.camera.id for result in results if result.evidence.agreement < GATE.least_agreement}
     of_field = not lost or any(result.accepted for result in results)
     return [d for d in deviations if (of_field if d.camera is None else d.camera not in lost)]
 
 
-def ridge_rejection(pitch: Field, gate: Gate) -> Refusal | None:
+def ridge_rejection(pitch: Field) -> Refusal | None:
     """Return the refusal of a field whose ridge was found along with the poses and cannot be one; None when it can."""
     height = 0.0 if pitch.ridge is None else float(pitch.ridge[0, 2])
-    if 0 <= height <= gate.highest_ridge_m:
+    if 0 <= height <= GATE.highest_ridge_m:
         return None
     return Refusal(
         "ridge",
         f"the lines fit best with a ridge at {height:.3f} m, and a pitch has one between 0 and "
-        f"{gate.highest_ridge_m:.0f} m; calibrate without fit_ridge",
+        f"{GATE.highest_ridge_m:.0f} m; calibrate without fit_ridge",
     )
 
 
-def alone_rejection(result: CameraResult, gate: Gate) -> Refusal | None:
+def alone_rejection(result: CameraResult) -> Refusal | None:
     """Return the refusal of a camera's pose whatever the others say; None when it may replace the stored one."""
     if not result.view.usable:
         return Refusal(_reason_of(result.view), result.view.words)
     moved, seen = result.moved, result.evidence
-    if seen.agreement < gate.least_agreement:
+    if seen.agreement < GATE.least_agreement:
         return Refusal(
             "lines",
             in_one_sentence(
                 [
                     f"the markings in the frame do not fit this pitch: {seen.share:.0%} of their length is where it "
-                    f"ought to be, at least {gate.least_share(seen):.0%} are needed ({seen.by_chance:.0%} is seen "
+                    f"ought to be, at least {GATE.least_share(seen):.0%} are needed ({seen.by_chance:.0%} is seen "
                     "anywhere); is it the right camera and the right sport, is the view free and lit, is the stored "
                     "pose within a few degrees?",
                     *_other_lines(result),
@@ -204,7 +205,7 @@ def alone_rejection(result: CameraResult, gate: Gate) -> Refusal | None:
             "few-lines",
             f"fewer than {FEWEST_MEASUREMENTS} points of lines could be measured; is the view free and lit?",
         )
-    limit = gate.most_residual_px(result.camera)
+    limit = GATE.most_residual_px(result.camera)
     if result.residual_px > limit:
         return Refusal(
             "residual",
@@ -216,46 +217,46 @@ def alone_rejection(result: CameraResult, gate: Gate) -> Refusal | None:
                 ]
             ),
         )
-    if result.zoom is not None and zoomed_beyond_doubt(result, gate):
+    if result.zoom is not None and zoomed_beyond_doubt(result):
         return Refusal(
             "zoomed",
             f"{zoom_in_words(result.camera, result.zoom)}, which puts the camera {result.zoom_shift_m:.2f} m from "
             "where it seems to be: zoom or focus have moved, or the lens is not this one; calibrate the lens again",
         )
-    if undetermined := _why_undetermined(result.ground_sigma, gate):
+    if undetermined := _why_undetermined(result.ground_sigma):
         return Refusal("undetermined", undetermined)
-    beaten_by_any = seen.agreement < 1 - gate.agreement_loss
-    if beaten_by_any and seen.agreement < (before := result.evidence_before()).agreement - gate.agreement_loss:
+    beaten_by_any = seen.agreement < 1 - GATE.agreement_loss
+    if beaten_by_any and seen.agreement < (before := result.evidence_before()).agreement - GATE.agreement_loss:
         return Refusal(
             "stored-better",
             f"the stored pose fits the frame better: {before.share:.0%} of the markings' length is "
             f"seen where it puts them, with the new pose {seen.share:.0%}",
         )
-    if moved.beyond(gate):
+    if moved.exceeds_limits:
         return Refusal(
             "moved",
-            f"{moved.words(gate)}; if somebody moved the camera, accept the job by hand once its picture is right",
+            f"{moved.words()}; if somebody moved the camera, accept the job by hand once its picture is right",
         )
-    if result.moved_in_all is not None and result.moved_in_all.beyond(gate):
+    if result.moved_in_all is not None and result.moved_in_all.exceeds_limits:
         return Refusal(
             "moved",
-            f"{result.moved_in_all.words(gate)}, over all jobs since its pose was last stored by hand: its mount may "
+            f"{result.moved_in_all.words()}, over all jobs since its pose was last stored by hand: its mount may "
             "be giving way; look at it, then store this pose, or accept the job by hand",
         )
     return None
 
 
-def _why_undetermined(ground: GroundSigma | None, gate: Gate) -> str | None:
+def _why_undetermined(ground: GroundSigma | None) -> str | None:
     advice = "let the camera see lines in more than one direction, or measure lens or field again"
     if ground is None:
         return f"no marking is in view where the pose puts the camera; {advice}"
-    metres, pixels, beyond = ground.worst(gate.largest_ground_sigma_m, gate.largest_ground_sigma_px)
+    metres, pixels, beyond = ground.worst(GATE.largest_ground_sigma_m, GATE.largest_ground_sigma_px)
     if not beyond:
         return None
     return (
         f"the visible lines do not determine the pose: what is in view may lie {metres:.2f} m ({pixels:.1f} px) from "
-        f"where it is put on the ground (sigma, at most {gate.largest_ground_sigma_m} m or "
-        f"{gate.largest_ground_sigma_px} px allowed); {advice}"
+        f"where it is put on the ground (sigma, at most {GATE.largest_ground_sigma_m} m or "
+        f"{GATE.largest_ground_sigma_px} px allowed); {advice}"
     )
 
 
@@ -285,10 +286,10 @@ def _other_lines(result: CameraResult) -> list[str]:
     ]
 
 
-def zoomed_beyond_doubt(result: CameraResult, gate: Gate) -> bool:
+def zoomed_beyond_doubt(result: CameraResult) -> bool:
     """True if the lines contradict the focal length, and the pose with it: either alone may be chance."""
     sure = result.zoom is not None and is_sure(result.zoom)
-    return sure and result.zoom_shift_m > gate.largest_zoomed_m
+    return sure and result.zoom_shift_m > GATE.largest_zoomed_m
 
 
 def zoom_in_words(camera: Camera, zoom: Deviation) -> str:

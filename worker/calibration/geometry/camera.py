@@ -82,6 +82,10 @@ class Camera:
         plane = self.intrinsics.undistort(pixels)
         return np.concatenate([plane, np.ones_like(plane[..., :1])], axis=-1) @ self.pose.matrix
 
+    def distance_m(self, other: Camera) -> float:
+        """Return the distance (m) between the positions of two cameras."""
+        return float(np.linalg.norm(self.pose.position - other.pose.position))
+
     def with_pose(self, pose: Pose) -> Camera:
         """Return the camera with another pose."""
         return Camera(self.id, self.intrinsics, pose, self.ignored)

@@ -348,10 +348,8 @@ def _moves_m(
     there = refiner.down_huber(there, measured)
     for _ in range(MOST_STEPS):
         there = refiner.towards_tukey(there, measured).to
-    return {
-        before.id: float(np.linalg.norm(after.pose.position - before.pose.position))
-        for before, after in zip(estimate.cameras, there.cameras, strict=True)
-    }
+    moved = zip(estimate.cameras, there.cameras, strict=True)
+    return {before.id: before.distance_m(after) for before, after in moved}
 
 
 def _of_seen(measured: Sequence[Measurements], evidence: Sequence[Evidence]) -> list[Measurements]:

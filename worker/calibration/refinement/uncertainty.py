@@ -187,7 +187,7 @@ class RefinedPose:
     def zoom_shift_m(self) -> float:
         """Distance (m) from the camera's position to its position with the fitted zoom."""
         there = self.camera if self.with_fitted_zoom is None else self.with_fitted_zoom
-        return float(np.linalg.norm(there.pose.position - self.camera.pose.position))
+        return self.camera.distance_m(there)
 
     @property
     def sigma(self) -> Sigma | None:

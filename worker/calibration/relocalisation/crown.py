@@ -12,7 +12,7 @@ from functools import partial
 
 import numpy as np
 
-from worker.calibration.gate.quality import Gate
+from worker.calibration.gate.quality import GATE
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.parameters import free_ridge
 from worker.calibration.refinement.refine import Observations, refine
@@ -46,7 +46,7 @@ def find_crown(
     found = refine(flat, cameras, observations, 0.0, [*lenses, *free_ridge(flat)])
     height_m, sigma_m = found.pitch.ridge_height, found.parameter_uncertainties[-1].sigma
     # It is at least 5 cm high, and five of its standard deviations.
-    if not max(0.05, 5.0 * sigma_m) < height_m < Gate().highest_ridge_m:
+    if not max(0.05, 5.0 * sigma_m) < height_m < GATE.highest_ridge_m:
         return None
     observed = map(partial(FrameObservations.of, found.pitch), observations.channels, observations.responses)
     refined = [frame.assessed(pose, one) for frame, pose, one in zip(observed, found.each, sought, strict=True)]

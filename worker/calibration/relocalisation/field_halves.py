@@ -114,4 +114,4 @@ def _clearness(camera: Camera, standing: Sequence[Camera]) -> float:
 
 def _distance(camera: Camera, standing: Sequence[Camera]) -> float:
     """Return the distance to the nearest of others, m."""
-    return min(float(np.linalg.norm(camera.pose.position - other.pose.position)) for other in standing)
+    return min(camera.distance_m(other) for other in standing)

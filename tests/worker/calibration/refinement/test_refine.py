@@ -21,7 +21,7 @@ from worker.calibration.detection.contrast import Channels
 from worker.calibration.detection.line_matching import expected_profiles, sliding_correlation
 from worker.calibration.detection.line_measurement import LineProfiles, measure_lines
 from worker.calibration.diagnostics.registration import register_pair
-from worker.calibration.gate.quality import Gate
+from worker.calibration.gate.quality import GATE
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.parameters import free_focal_lengths, free_ridge, lens_parameters
 from worker.calibration.geometry.rotation import rotation_angles_deg
@@ -204,7 +204,7 @@ def test_a_lone_touchline_neither_lets_a_camera_run_away_nor_makes_it_sure(disto
     refined = refine(CROWNED, [moved(one, by=(0.2, 0.0, 0.0))], observed(CROWNED, [one]), 0.5)
     assert refined.each[0].residual_px is not None
     assert np.linalg.norm(refined.cameras[0].pose.position - one.pose.position) < 1.5
-    assert refined.each[0].sigma.position_m > Gate().largest_ground_sigma_m
+    assert refined.each[0].sigma.position_m > GATE.largest_ground_sigma_m
 
 
 @pytest.mark.parametrize("colour", [0, 2])
