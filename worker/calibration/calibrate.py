@@ -28,7 +28,7 @@ from worker.calibration.records import (
     Segment,
 )
 from worker.calibration.refinement.diagnosis import find_suspicions
-from worker.calibration.solve import solve, solve_in_paint
+from worker.calibration.solve import solve
 from worker.calibration.steps import is_doubtful, loss_of
 from worker.calibration.stitching.photometric_alignment import evened_out
 
@@ -69,7 +69,7 @@ def calibrate(
 
     # Solve and judge: where the cameras stood if all usable ones pass there, else by search and refinement; and among
     # the lines of several sports in the paint of one.
-    solution, observer = solve_in_paint(solve(problem, observer, progress), observer, progress)
+    solution, observer = solve(problem, observer, progress)
 
     # Recover: search anywhere for cameras that do not stand where they stood.
     solution = _recover(solution, observer, progress)

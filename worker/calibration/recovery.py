@@ -34,7 +34,7 @@ from worker.calibration.relocalisation.field_map import FieldMap
 from worker.calibration.relocalisation.paint import Paint
 from worker.calibration.relocalisation.relocalise import Relocalisation, mean_shift_px, relocalise, twin
 from worker.calibration.relocalisation.sought import ANYWHERE, KNOCKED_ROLL_DEG, Place, SoughtCamera, SoughtLens
-from worker.calibration.solve import solve
+from worker.calibration.solve import solve_in_all_colours
 from worker.calibration.steps import is_doubtful
 
 LOST = frozenset({"lines", "few-lines"})
@@ -104,7 +104,7 @@ def recover_knocked(solution: Solution, observer: FrameObserver, progress: Progr
     found = {n: one for n, one in searched.items() if one is not None}
     while found:
         there = _restart_from(problem, found)
-        again = solve(there, replace(observer, cameras=there.cameras), progress.muted())
+        again = solve_in_all_colours(there, replace(observer, cameras=there.cameras), progress.muted())
         both = zip(judged.cameras, again.judged.cameras, strict=True)
         confirmed = {n: one for n, one in found.items() if _is_there(again.judged.cameras[n])}
         harmed = any(one.accepted and not two.accepted for one, two in both)

@@ -1,4 +1,4 @@
-"""Solving for the poses of all cameras: where they stood, then around it, and on a shared floor in one paint.
+"""Solving for the poses of all cameras: where they stood, then around it, in all colours or in the paint of a field.
 
 The cheapest explanation comes first, and the first one that the gate accepts for all cameras is the answer.
 """
@@ -8,36 +8,79 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from worker.calibration.gate.quality import MUCH_UNEXPECTED
+from worker.calibration.diagnostics.overlap import Overlap, overlap_of
+from worker.calibration.gate.quality import GATE, MUCH_UNEXPECTED
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.joint_verdict import judge_together
 from worker.calibration.near_path import NearSolution, refine_by_lines
 from worker.calibration.observe import FrameObserver
-from worker.calibration.paint_path import log_odds, show_paint_of_field
+from worker.calibration.paint_path import (
+    around_stored_poses,
+    at_stored_poses,
+    log_odds,
+    show_paint_of_field,
+)
 from worker.calibration.problem import PoseSolution, Problem, Solution
 from worker.calibration.records import EngineResult, Path, ProgressReporter
-from worker.calibration.steps import evidence_at, refine_without, with_unusable_cameras
+from worker.calibration.steps import evidence_at, refine_without, shows_most_lines, with_unusable_cameras
 from worker.calibration.swapped_cameras import mark_swapped_frames
 from worker.calibration.wide_path import NO_CAMERAS, search_and_refine, search_in_overviews
 from worker.calibration.zoom_refit import refit_zoomed
 
 
-def solve(problem: Problem, observer: FrameObserver, progress: ProgressReporter) -> Solution:
-    """Solve for the poses of all cameras and judge them, in all colours of the frames.
+def solve(problem: Problem, observer: FrameObserver, progress: ProgressReporter) -> tuple[Solution, FrameObserver]:
+    """Solve for the poses of all cameras, in all colours of their frames or in the paint of the field.
 
-    Lines are asked first, where the cameras stood and then around it, and the network looks in full where they do not
-    suffice. Only cameras that are not near their stored poses are searched for.
+    Also return the frames that the solution explains. Other sports' lines are in view of all cameras of a floor, where
+    a camera that was turned is alone: only then is a paint looked for.
     """
-    everyone = range(len(problem.cameras))
     problem = observer.with_overviews(problem, progress)
-
-    # Where the cameras stood.
-    near = refine_by_lines(problem, progress) if problem.options.search == "auto" else None
+    near = _refine_near(problem, progress)
     solution = _solve_near(problem, near, progress)
     if solution is not None:
-        return solution
+        return solution, observer
 
-    # Around it, by overviews. Cameras that are all near contradict each other: none of them is known to be right.
+    # Where the cameras stood, in one paint.
+    if problem.options.search == "auto" and _stand_among_other_lines(problem):
+        painted = show_paint_of_field(problem, observer, at_stored_poses, progress.muted())
+        solution = None if painted is None else _solve_near_in(painted, problem, progress)
+        if painted is not None and solution is not None:
+            return solution, painted
+
+    # Around it, in all colours and then in one paint.
+    solution = _solve_farther(problem, near, observer, progress)
+    problem, judged = solution.problem, solution.judged
+    if not _are_mostly_others([judged.cameras[n].overlap for n in problem.usable]):
+        return solution, observer
+    painted = show_paint_of_field(problem, observer, around_stored_poses, progress.muted())
+    if painted is None:
+        return solution, observer
+    seen = painted.with_overviews(painted.seen_in(problem), progress)
+    again = _solve_around(seen, painted, range(len(problem.cameras)), NO_CAMERAS, progress)
+    return (again, painted) if _is_likelier(again, solution) else (solution, observer)
+
+
+def solve_in_all_colours(problem: Problem, observer: FrameObserver, progress: ProgressReporter) -> Solution:
+    """Solve for the poses of all cameras by all that their frames show."""
+    problem = observer.with_overviews(problem, progress)
+    near = _refine_near(problem, progress)
+    return _solve_near(problem, near, progress) or _solve_farther(problem, near, observer, progress)
+
+
+def _refine_near(problem: Problem, progress: ProgressReporter) -> NearSolution | None:
+    """Refine the cameras that stand almost where they stood; None if none do, or a search was asked for."""
+    return refine_by_lines(problem, progress) if problem.options.search == "auto" else None
+
+
+def _solve_farther(
+    problem: Problem, near: NearSolution | None, observer: FrameObserver, progress: ProgressReporter
+) -> Solution:
+    """Search for the cameras that are not `near` their stored poses.
+
+    Lines are asked first, and the network looks in full where they do not suffice. Cameras that are all near contradict
+    each other: none of them is known to be right.
+    """
+    everyone = range(len(problem.cameras))
     if near is None or near.numbers == problem.usable:
         near, lost = None, list(everyone)
     else:
@@ -50,28 +93,43 @@ def solve(problem: Problem, observer: FrameObserver, progress: ProgressReporter)
     return _solve_around(problem, observer, lost, NO_CAMERAS if near is None else near.cameras, progress)
 
 
-def solve_in_paint(
-    solution: Solution, observer: FrameObserver, progress: ProgressReporter
-) -> tuple[Solution, FrameObserver]:
-    """Return the likelier of a solution in all colours and one in the paint of the field, with the frames it explains.
+def _stand_among_other_lines(problem: Problem) -> bool:
+    """True if the stored poses of all usable cameras see the field's lines, and mostly others beside them."""
+    group = problem.of(problem.usable)
+    seen = [group.observed.seen_by_network(n) for n in range(len(group.cameras))]
+    cameras = [camera.resized(of.shape[1]) for camera, of in zip(group.cameras, seen, strict=True)]
+    overlaps = [overlap_of(group.pitch, camera, of) for camera, of in zip(cameras, seen, strict=True)]
+    reader = group.observed.observations.reader()
+    return _are_mostly_others(overlaps) and all(shows_most_lines(group.pitch, group.cameras, reader))
 
-    Other sports' lines are in view of all cameras of a floor, where a camera that was turned is alone: only then is a
-    paint looked for. In one paint less of the field's lines is seen, so that solution has to be likelier in all
-    colours as well.
+
+def _are_mostly_others(overlaps: Sequence[Overlap]) -> bool:
+    """True if each camera sees mostly lines that are not the field's."""
+    return bool(overlaps) and all(one.unexpected >= MUCH_UNEXPECTED for one in overlaps)
+
+
+def _solve_near_in(painted: FrameObserver, problem: Problem, progress: ProgressReporter) -> Solution | None:
+    """Return the solution at the stored poses of a problem in `painted` frames; None unless it is accepted.
+
+    Less is seen of the field's lines in one paint: in all colours the stored poses may not fit better.
     """
-    problem, judged = solution.problem, solution.judged
-    usable = problem.usable
-    if not usable or any(judged.cameras[n].overlap.unexpected < MUCH_UNEXPECTED for n in usable):
-        return solution, observer
-    painted = show_paint_of_field(problem, observer, progress.muted())
-    if painted is None:
-        return solution, observer
     seen = painted.with_overviews(painted.seen_in(problem), progress)
-    again = _solve_around(seen, painted, range(len(problem.cameras)), NO_CAMERAS, progress)
+    solution = _solve_near(seen, _refine_near(seen, progress), progress)
+    if solution is None:
+        return None
+    for n in problem.usable:
+        stored, found = problem.cameras[n], solution.judged.cameras[n].camera
+        before, after = (evidence_at(problem, n, camera).agreement for camera in (stored, found))
+        if after < before - GATE.agreement_loss:
+            return None
+    return solution
+
+
+def _is_likelier(in_paint: Solution, in_all: Solution) -> bool:
+    """True if the solution in one paint is likelier in all colours, too; less is seen of the field's lines in one."""
     # What passes neither way is looked for elsewhere, by all that is seen.
-    passes = any(one.accepted for one in [*judged.cameras, *again.judged.cameras])
-    is_likelier = passes and _log_odds(problem, again.judged) > _log_odds(problem, judged)
-    return (again, painted) if is_likelier else (solution, observer)
+    passes = any(one.accepted for one in [*in_all.judged.cameras, *in_paint.judged.cameras])
+    return passes and _log_odds(in_all.problem, in_paint.judged) > _log_odds(in_all.problem, in_all.judged)
 
 
 def _solve_near(problem: Problem, near: NearSolution | None, progress: ProgressReporter) -> Solution | None:

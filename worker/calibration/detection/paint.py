@@ -51,11 +51,14 @@ def _angle(one: Array, other: Array) -> float:
     return float(np.arccos(np.clip(one @ other / (np.linalg.norm(one) * np.linalg.norm(other)), -1.0, 1.0)))
 
 
-def draw_colours(frame: Frame, colours: Array, chosen: Sequence[int]) -> Frame:
-    """Return the frame (H, W, 3) in grey, bright where it has the chosen ones of the `colours` (K, 3) of lines."""
+def draw_colours(frame: Frame, colours: Array, choices: Sequence[Sequence[int]]) -> list[Frame]:
+    """Draw a frame (H, W, 3) in grey, once for each of the `choices` among the `colours` (K, 3) of its lines.
+
+    The chosen ones are bright, and all else is as dark as the ground.
+    """
     sizes = np.linalg.norm(colours, axis=1)
     directions = (colours / sizes[:, None]).T.astype(np.float32)
-    drawn = np.empty_like(frame)
+    drawn = [np.empty_like(frame) for _ in choices]
     # The share of a paint below which a pixel shows none: noise, and edges of other lines.
     faintest = 0.15
     for rows, difference in _differences(frame):
@@ -66,10 +69,11 @@ def draw_colours(frame: Frame, colours: Array, chosen: Sequence[int]) -> Frame:
         # A colour unlike all of them belongs to none, and not to the nearest.
         belongs = likelihood / np.maximum(likelihood.sum(axis=-1, keepdims=True), np.exp(-0.5 * 2.0**2))
         share = np.clip(along / sizes.astype(np.float32), 0.0, 1.0)
-        shown = (belongs * share)[..., list(chosen)].sum(axis=-1)
-        shown = np.clip((shown - faintest) / (1 - faintest), 0.0, 1.0)
-        # Grey levels of the ground, and by how much paint is brighter.
-        drawn[rows] = (60.0 + 140.0 * shown)[..., None]
+        of_each = belongs * share
+        for picture, chosen in zip(drawn, choices, strict=True):
+            shown = np.clip((of_each[..., list(chosen)].sum(axis=-1) - faintest) / (1 - faintest), 0.0, 1.0)
+            # Grey levels of the ground, and by how much paint is brighter.
+            picture[rows] = (60.0 + 140.0 * shown)[..., None]
     return drawn
 
 
