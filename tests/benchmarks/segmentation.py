@@ -26,7 +26,7 @@ from tests.real.pair import FOLDER as REAL_PAIR
 from worker.calibration.detection.segmentation import Segmenter, reachable_regions
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.field import Field
-from worker.calibration.solve import CAPTURE_RAD
+from worker.calibration.steps import CAPTURE_RAD
 
 DEMO = Path(__file__).parents[1] / "demo"
 THREADS = 2

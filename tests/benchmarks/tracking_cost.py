@@ -39,7 +39,7 @@ PARTS: dict[str, list[tuple[Any, str]]] = {
     "centres of lines": [(LineProfiles, "measure")],
     "pose by least squares": [(TrackedLines, "explained")],
     "learning": [(TrackedLines, "learn")],
-    "filter": [(State, "after"), (State, "drawn_back"), (State, "surprise"), (State, "with_observed")],
+    "filter": [(State, "after"), (State, "with_mast_prior"), (State, "squared_innovation"), (State, "with_observed")],
 }
 REST, DECODING = "the rest: where lines are expected, choosing pieces", "decoding, beside it"
 # Prints the core-ms of each picture in another release: of making colours of it and of following it.

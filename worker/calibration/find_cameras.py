@@ -14,7 +14,7 @@ from worker.calibration.detection.contrast import Channels
 from worker.calibration.detection.exclusions import of_use
 from worker.calibration.detection.frame_fusion import median, sways
 from worker.calibration.detection.segmentation import Region, whole_frame
-from worker.calibration.gate.quality import CameraResult, Gate
+from worker.calibration.gate.quality import GATE, CameraResult
 from worker.calibration.geometry.camera import Camera, Frame
 from worker.calibration.geometry.field import Field
 from worker.calibration.records import Calibration, Options, Progress, ProgressReporter, Segment, StageTimings
@@ -44,7 +44,7 @@ USUAL_CORE_S, USUAL_CORE_S_KNOWN_LENS = 35.0, 5.0
 
 @dataclass(frozen=True)
 class FoundCamera:
-    """What was found for one camera that was sought.
+    """Result of the search for one camera.
 
     `candidates`: cameras that may have taken its frame, the best first, for a person to choose from; a best one that is
     accepted is at the pose of a calibration that began with it. `refusal`: why the best one is not taken, None where it
@@ -60,12 +60,12 @@ class FoundCamera:
 
     @property
     def accepted(self) -> bool:
-        """Whether a calibration can begin with the best candidate."""
+        """True if a calibration can begin with the best candidate."""
         return self.refusal is None
 
     @property
     def was_calibrated(self) -> bool:
-        """Whether a calibration has begun with the best candidate, on the field as it was found."""
+        """True if a calibration has begun with the best candidate, on the field as it was found."""
         return self.refusal is None or self.refusal.reason == "not-confirmed"
 
 
@@ -179,7 +179,7 @@ class _Remembered:
         self._segment, self._responses = segment, responses
 
     def __call__(self, frame: Frame, regions: Sequence[Region]) -> NDArray[np.uint8]:
-        """As the network."""
+        """Return the network's response (H, W) to a frame."""
         known = self._responses.get(id(frame))
         return self._segment(frame, regions) if known is None else known
 
@@ -187,7 +187,7 @@ class _Remembered:
 def _seen(
     sought: SoughtCamera, frames: Sequence[Frame], responses: Sequence[NDArray[np.uint8]]
 ) -> tuple[Channels, NDArray[np.float32]]:
-    """The frames of a camera, and the fused response of the network (H, W) in 0..1, 0 where they are ignored."""
+    """Return the channels of a camera's frames and the fused response (H, W) in 0..1, 0 where they are ignored."""
     swayed = sways(frames, sought.lenses[0].lens)
     return Channels(frames, swayed), of_use(sought.ignored, median(responses, swayed) / np.float32(255))
 
@@ -195,7 +195,7 @@ def _seen(
 def _with_lenses_of_others(
     sought: Sequence[SoughtCamera], alone: Mapping[str, Relocalisation]
 ) -> Iterator[SoughtCamera]:
-    """Cameras that were not found, each with the lenses that were found for others: often all are of one kind."""
+    """Yield the cameras that were not found, each with the lenses found for others: often all are of one kind."""
     for one in sought:
         if not one.is_lens_sought or alone[one.id].refusal is None:
             continue
@@ -214,7 +214,7 @@ def _on_their_sides(
     known: Sequence[Camera],
     ground: SharedGround,
 ) -> dict[str, Relocalisation]:
-    """The same with each camera on its side of a symmetric field; refused where that is not clear."""
+    """Return the results with each camera on its side of a symmetric field; refused where that is not clear."""
     best = [one.candidates[0].camera for one in alone.values() if one.refusal is None]
     sides = {one.camera.id: one for one in choose_sides(best, {one.id: one.place for one in sought}, known, ground)}
     placed = dict[str, Relocalisation]()
@@ -241,7 +241,7 @@ def _on_its_crown(
     sought: Mapping[str, SoughtCamera],
     seen: Mapping[str, tuple[Channels, NDArray[np.float32]]],
 ) -> tuple[Field, dict[str, Relocalisation]]:
-    """The field with the ridge that the lines of the cameras tell that were found on it flat, and these on that."""
+    """Return the field with the ridge that fits the lines of the cameras found on it flat, and these cameras on it."""
     found = [camera for camera, one in placed.items() if one.refusal is None]
     if not found:
         return flat, placed
@@ -258,7 +258,7 @@ def _on_its_crown(
 
 
 def _judged(sought: SoughtCamera, found: Relocalisation, calibrated: Calibration | None) -> FoundCamera:
-    """What was found, and what a calibration that began with it says."""
+    """Return the result for one camera, with the verdict of the calibration that began with it."""
     if found.refusal is not None or calibrated is None:
         return FoundCamera(sought.id, found.candidates, found.refusal, found.remarks)
     (result,) = (one for one in calibrated.cameras if one.camera.id == sought.id)
@@ -272,17 +272,17 @@ def _judged(sought: SoughtCamera, found: Relocalisation, calibrated: Calibration
 
 
 def _with_twin(found: FoundCamera) -> FoundCamera:
-    """The same with the twin of its best candidate behind it: all cameras of the search may stand half a turn away."""
+    """Return the result with the twin of its best candidate behind it: the whole search may be off by half a turn."""
     best, *others = found.candidates
     both = [best, replace(best, camera=twin(best.camera))]
     return replace(found, candidates=[*both, *others], assumed_side=side_of(best.camera))
 
 
 def why_not_confirmed(result: CameraResult, *, is_lens_found: bool) -> str | None:
-    """What the calibration that began with a camera has against it, in words; None if nothing."""
+    """Return in words why the calibration that began with a camera does not confirm it; None if it does."""
     if result.refusal is not None:
         return result.refusal.words
-    most_px = FITS_BETTER * Gate().most_residual_px(result.camera)
+    most_px = FITS_BETTER * GATE.most_residual_px(result.camera)
     if is_lens_found and result.residual_px is not None and result.residual_px > most_px:
         return (
             f"lines are {result.residual_px:.2f} px from where pose and lens put them, at most {most_px:.2f} allowed "
@@ -297,25 +297,21 @@ def why_lens_unfit(result: CameraResult, suspicions: Sequence[Suspicion]) -> str
 
     A job has a stored pose beside the lens. A search has nothing but the lines, and what it finds is stored.
     """
-    gate, focal_px = Gate(), result.camera.intrinsics.focal_length_px
+    focal_px = result.camera.intrinsics.focal_length_px
     assert result.sigma is not None
     for one in suspicions:
-        away_m = 0.0 if result.refined is None else _apart_m(result.camera, result.refined.camera)
-        if (one.camera, one.quantity) == (result.camera.id, FOCAL) and away_m > gate.largest_zoomed_m:
+        away_m = 0.0 if result.refined is None else result.camera.distance_m(result.refined.camera)
+        if (one.camera, one.quantity) == (result.camera.id, FOCAL) and away_m > GATE.largest_zoomed_m:
             by = f"{abs(one.deviation) / focal_px:.2%} ± {one.sigma / focal_px:.2%}"
             return (
                 f"the lines fit a focal length {by} {'longer' if one.deviation > 0 else 'shorter'} than that of the "
                 f"lens that was given, which puts the camera {away_m:.2f} m from where it seems to be; leave the lens "
                 "out, or give one that was measured"
             )
-    if result.sigma.position_m > gate.largest_found_sigma_m:
+    if result.sigma.position_m > GATE.largest_found_sigma_m:
         return (
             "how far off the lens may be that was given leaves open where the camera stands: "
-            f"{result.sigma.position_m:.2f} m (at most {gate.largest_found_sigma_m} allowed); say how well it is known "
+            f"{result.sigma.position_m:.2f} m (at most {GATE.largest_found_sigma_m} allowed); say how well it is known "
             "(sigma), or leave it out"
         )
     return None
-
-
-def _apart_m(one: Camera, other: Camera) -> float:
-    return float(np.linalg.norm(one.pose.position - other.pose.position))

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 
 from worker.calibration.gate.quality import CameraResult
 from worker.calibration.geometry.camera import Camera
+from worker.calibration.problem import Problem
 from worker.calibration.records import ProgressReporter
 from worker.calibration.refinement.refine import refine
 from worker.calibration.refinement.uncertainty import RefinedPoses
-from worker.calibration.solve import (
-    Problem,
+from worker.calibration.steps import (
     follows_zoom,
     free_parameters,
     has_hardly_moved,

@@ -25,9 +25,10 @@ from worker.calibration.gate.quality import in_one_sentence
 from worker.calibration.geometry.camera import Array, Camera, Frame
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.visibility import VisibleLines
+from worker.calibration.problem import ObservedCameras, Problem
 from worker.calibration.records import CalibrationError, ProgressReporter, Segment
 from worker.calibration.refinement.refine import Observations
-from worker.calibration.solve import CAPTURE_RAD, ObservedCameras, Problem
+from worker.calibration.steps import CAPTURE_RAD
 
 FEWEST_VISIBLE_POINTS = 60
 """Line points (25 cm apart) a stored pose has to see; less cannot fix a pose."""
@@ -91,22 +92,26 @@ class FrameObserver:
             frames[camera.id] = [np.asarray(small, dtype=np.uint8)]
         return FrameObserver.of(self.pitch, cameras, frames, self.segment)
 
-    def in_colours(self, colours: Array, chosen: Sequence[int]) -> FrameObserver:
-        """Return the observer of the first frames, in which only the chosen ones of the `colours` of lines show.
+    def in_colours(self, colours: Array, choices: Sequence[Sequence[int]]) -> list[FrameObserver]:
+        """Return for each of the `choices` an observer of the first frames that shows only these `colours` of lines.
 
         All frames of a job may fill half of its memory.
         """
-        drawn = {name: [draw_colours(its[0], colours, chosen)] for name, its in self.frames.items()}
-        return FrameObserver.of(self.pitch, self.cameras, drawn, self.segment)
+        drawn = {name: draw_colours(its[0], colours, choices) for name, its in self.frames.items()}
+        return [
+            FrameObserver.of(self.pitch, self.cameras, {name: [its[n]] for name, its in drawn.items()}, self.segment)
+            for n in range(len(choices))
+        ]
 
     def with_overviews(self, problem: Problem, progress: ProgressReporter) -> Problem:
         """Return the problem with what the network sees in overviews of the first frames of all cameras.
 
-        Of those that it has looked at in full, none is needed.
+        Of those that it has looked at, none is needed.
         """
         overviews = list(problem.observed.overviews)
+        unseen = [n for n, seen in enumerate(overviews) if seen is None and n not in problem.observed.in_full]
         with progress.timed("segmentation"):
-            for n in [n for n in range(len(self.cameras)) if n not in problem.observed.in_full]:
+            for n in unseen:
                 frame = overview(self.frames[self.cameras[n].id][0])
                 camera = self.cameras[n].resized(frame.shape[1])
                 response = self.segment(frame, self.regions_of_lines(camera)).astype(np.float32)

@@ -1,16 +1,16 @@
 """The paint path: on a floor of several sports, the lines of one field are told from the others by their colour.
 
 Which paint is the field's is one unknown that all its lines and all cameras share. Where most of what looks like a
-line on the field is none of its lines, each colour on the floor is taken for the field's, and the cameras are searched
-for in frames that show no other. The field has the colour that most likely shows its lines: it covers them and lies
-nowhere else, from where the cameras may be. With it go all colours most of which lie on its lines then: paint in light
-and in shade, or beside another line. Where another colour is about as likely with other poses, the frames do not tell,
-and the field is looked for in all colours.
+line on the field is none of its lines, each colour on the floor is taken for the field's, and the cameras are placed by
+frames that show no other: where they stood, and if that tells nothing, where a search finds them. The field has the
+colour that most likely shows its lines: it covers them and lies nowhere else, from where the cameras may be. With it go
+all colours most of which lie on its lines then: paint in light and in shade, or beside another line. Where another
+colour is about as likely with other poses, the frames do not tell, and the field is looked for in all colours.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -23,10 +23,11 @@ from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.derivatives import POSE_NUMBERS
 from worker.calibration.geometry.visibility import VisibleLines
 from worker.calibration.observe import FrameObserver
+from worker.calibration.problem import Problem
 from worker.calibration.records import ProgressReporter
 from worker.calibration.refinement.least_squares import CLUSTER_POINTS
 from worker.calibration.refinement.priors import MOVED_M, MOVED_RAD
-from worker.calibration.solve import Problem, network_responses, search_poses
+from worker.calibration.steps import network_responses, search_poses
 
 COMPARED_WIDTH_PX = 1280
 """Width of the frames in which colours are compared. Lines are wide enough to show their paint, and which is the
@@ -39,7 +40,7 @@ SURE_NATS = float(np.log(1000))
 
 @dataclass(frozen=True)
 class _Explanation:
-    """Where a search in overviews finds the `cameras`, in frames that show some colours only."""
+    """Explanation of a problem by `cameras`, in frames that show some colours only."""
 
     problem: Problem
     cameras: Sequence[Camera]
@@ -73,14 +74,31 @@ def log_odds(problem: Problem, found: Sequence[Camera], shares: Sequence[float])
     return total
 
 
-def show_paint_of_field(problem: Problem, observer: FrameObserver, progress: ProgressReporter) -> FrameObserver | None:
+Locate = Callable[[Problem, ProgressReporter], Sequence[Camera]]
+"""Function that says where the cameras of a problem may stand."""
+
+
+def at_stored_poses(problem: Problem, _: ProgressReporter) -> Sequence[Camera]:
+    """Return the cameras where they are stored."""
+    return problem.cameras
+
+
+def around_stored_poses(problem: Problem, progress: ProgressReporter) -> Sequence[Camera]:
+    """Return the cameras where the paper's search finds them around their stored poses."""
+    return search_poses(problem, network_responses(problem), progress).cameras
+
+
+def show_paint_of_field(
+    problem: Problem, observer: FrameObserver, locate: Locate, progress: ProgressReporter
+) -> FrameObserver | None:
     """Return the frames in which only the paint of the field's lines shows; None where no paint is likelier than all
-    others."""
+    others. `locate` places the cameras by what each paint shows."""
     small = observer.reduced(COMPARED_WIDTH_PX)
     first = [small.frames[small.cameras[n].id][0] for n in problem.usable]
     colours = sort_colours(first, [small.regions_of_lines(small.cameras[n]) for n in problem.usable])
     reduced = replace(problem, cameras=small.cameras)
-    explained = [_search_in(small.in_colours(colours, [n]), reduced, progress) for n in range(len(colours))]
+    shown = small.in_colours(colours, [[n] for n in range(len(colours))])
+    explained = [_explain(one, reduced, locate, progress) for one in shown]
     best = max(explained, key=lambda one: one.log_odds, default=None)
     if best is None:
         return None
@@ -89,10 +107,11 @@ def show_paint_of_field(problem: Problem, observer: FrameObserver, progress: Pro
     others = [one for n, one in enumerate(explained) if n not in chosen]
     if any(one.log_odds > best.log_odds - SURE_NATS for one in others):
         return None
-    return observer.in_colours(colours, chosen)
+    (painted,) = observer.in_colours(colours, [chosen])
+    return painted
 
 
-def _search_in(observer: FrameObserver, problem: Problem, progress: ProgressReporter) -> _Explanation:
+def _explain(observer: FrameObserver, problem: Problem, locate: Locate, progress: ProgressReporter) -> _Explanation:
     problem = observer.with_overviews(observer.seen_in(problem), progress)
     group = problem.of(problem.usable)
-    return _Explanation(group, search_poses(group, network_responses(group), progress).cameras)
+    return _Explanation(group, locate(group, progress))

@@ -132,7 +132,7 @@ class EngineResult:
 
     @property
     def verdict(self) -> Verdict:
-        """Whether the gate accepts the poses of all cameras, of some (`partly`) or of none."""
+        """`accepted` if the gate accepts the poses of all cameras, `partly` if of some, else `rejected`."""
         accepted = [camera.accepted for camera in self.cameras]
         return "accepted" if all(accepted) else "partly" if any(accepted) else "rejected"
 

@@ -8,7 +8,7 @@ person, or accepted where the venue says so.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import cv2
@@ -27,13 +27,15 @@ from worker.calibration.gate.quality import CameraResult, Moved, Refusal
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.rotation import rotation_angles_deg
 from worker.calibration.observe import FrameObserver
-from worker.calibration.records import EngineResult, Path, ProgressReporter
+from worker.calibration.problem import Problem, Solution
+from worker.calibration.records import ProgressReporter
 from worker.calibration.relocalisation.candidate import Candidate
 from worker.calibration.relocalisation.field_map import FieldMap
 from worker.calibration.relocalisation.paint import Paint
 from worker.calibration.relocalisation.relocalise import Relocalisation, mean_shift_px, relocalise, twin
 from worker.calibration.relocalisation.sought import ANYWHERE, KNOCKED_ROLL_DEG, Place, SoughtCamera, SoughtLens
-from worker.calibration.solve import PoseSolution, Problem, is_doubtful
+from worker.calibration.solve import solve_in_all_colours
+from worker.calibration.steps import is_doubtful
 
 LOST = frozenset({"lines", "few-lines"})
 """Reasons for a refusal of a camera that may have been knocked..."""
@@ -73,9 +75,6 @@ UNSEEN_PX, SAME_PART = 1e4, 0.002
 """What a marking counts that only one of two cameras sees; and cameras are the same that put the markings apart by less
 than this part of the frame's width."""
 
-Solved = tuple[Problem, PoseSolution, EngineResult, Path]
-"""A problem with all that was observed for its solution, the solution, its judgement, and the path that led there."""
-
 
 @dataclass(frozen=True)
 class FoundAgain:
@@ -86,42 +85,37 @@ class FoundAgain:
     view: ViewCondition
 
 
-def recover_knocked(
-    solved: Solved,
-    observer: FrameObserver,
-    solve: Callable[[Problem, FrameObserver, ProgressReporter], Solved],
-    progress: ProgressReporter,
-) -> Solved:
+def recover_knocked(solution: Solution, observer: FrameObserver, progress: ProgressReporter) -> Solution:
     """Return the solution with those cameras in it that were searched for and found again.
 
-    `solve`: what has `solved` the problem. The cameras of the problem that is returned are at their stored poses.
+    The cameras of its problem are at their stored poses.
     """
-    problem, solution, judged, path = solved
+    problem, judged = solution.problem, solution.judged
     if problem.options.search == "wide" or problem.options.recover == "never":
-        return solved
-    beside = [n for n in range(len(problem.cameras)) if _may_be_of_what_lies_beside(problem, n, observer)]
-    problem = observer.look_in_full(problem, beside, progress)
-    sought = _sought(problem, judged.cameras, beside)
+        return solution
+    doubted = [n for n in range(len(problem.cameras)) if _refusal_may_concern_wrong_region(problem, n, observer)]
+    problem = observer.look_in_full(problem, doubted, progress)
+    sought = _sought(problem, judged.cameras, doubted)
     if not sought:
-        return solved
-    solved = problem, solution, judged, path
+        return solution
+    solution = replace(solution, problem=problem)
     with progress.timed("evolution"):
         searched = {n: _search(problem, judged.cameras[n], n, observer, progress) for n in sought}
     found = {n: one for n, one in searched.items() if one is not None}
     while found:
-        begun = _begun_there(problem, found)
-        anew = solve(begun, replace(observer, cameras=begun.cameras), progress.muted())
-        _, _, again, _ = anew
-        confirmed = {n: one for n, one in found.items() if _is_there(again.cameras[n])}
-        harmed = any(one.accepted and not two.accepted for one, two in zip(judged.cameras, again.cameras, strict=True))
+        there = _restart_from(problem, found)
+        again = solve_in_all_colours(there, replace(observer, cameras=there.cameras), progress.muted())
+        both = zip(judged.cameras, again.judged.cameras, strict=True)
+        confirmed = {n: one for n, one in found.items() if _is_there(again.judged.cameras[n])}
+        harmed = any(one.accepted and not two.accepted for one, two in both)
         if confirmed.keys() == found.keys() and not harmed:
-            return _joined(solved, anew, found)
+            return _merge(solution, again, found)
         found = {} if harmed and confirmed.keys() == found.keys() else confirmed
-    return solved
+    return solution
 
 
-def _may_be_of_what_lies_beside(problem: Problem, number: int, observer: FrameObserver) -> bool:
-    """Whether what the view is refused for may be true of nothing but what the stored pose takes for the field."""
+def _refusal_may_concern_wrong_region(problem: Problem, number: int, observer: FrameObserver) -> bool:
+    """True if the refusal of a view may concern the wrong region: what the stored pose takes for the field."""
     view = problem.observed.views[number]
     figures = view.figures
     if view.cause == "dark" and figures.brightness > least_light(figures.noise, LEAST_LIGHT_IN_THE_DARK):
@@ -133,31 +127,31 @@ def _may_be_of_what_lies_beside(problem: Problem, number: int, observer: FrameOb
     return view.cause in OF_THE_GROUND
 
 
-def _sought(problem: Problem, results: Sequence[CameraResult], beside: Sequence[int]) -> list[int]:
-    """Numbers of the cameras to be searched for: all that were asked for, or those that may have been knocked.
+def _sought(problem: Problem, results: Sequence[CameraResult], doubted: Sequence[int]) -> list[int]:
+    """Return the indices of the cameras to search for: all that were asked for, or those that may have been knocked.
 
-    `beside`: those whose view is refused for what may be true of nothing but the place where they are stored.
+    `doubted`: those whose view may be refused for the wrong region.
     """
     if problem.options.search == "anywhere":
         return [n for n, one in enumerate(results) if one.view.cause != "other-camera"]
     responses = problem.observed.observations.responses
     # Lines that the network saw elsewhere contradict what is said of a view.
-    contradicted = {n for n in beside if _has_lines_elsewhere(problem, results[n], responses[n])}
-    return [n for n, one in enumerate(results) if n in contradicted or _is_lost(problem, one)]
+    contradicted = {n for n in doubted if _has_lines_elsewhere(problem, results[n], responses[n])}
+    return [n for n, one in enumerate(results) if n in contradicted or _is_lost(one)]
 
 
-def _is_lost(problem: Problem, result: CameraResult) -> bool:
-    """Whether a result is one of a camera that may have been knocked."""
+def _is_lost(result: CameraResult) -> bool:
+    """True if a camera may have been knocked."""
     if result.refusal is None:
         return is_doubtful(result)
     if result.refusal.reason in LOST_IF_FAR:
         # A mount that gave way over many nights stands where it was found last night.
-        return result.moved.beyond(problem.gate)
+        return result.moved.exceeds_limits
     return result.refusal.reason in LOST
 
 
 def _is_there(result: CameraResult) -> bool:
-    """Whether a camera stands where it was found: the gate has nothing against it, or but its lens and its sigma."""
+    """True if a camera stands where it was found: the gate accepts it, or refuses only its lens or its sigma."""
     return result.refusal is None or result.refusal.reason in UNFIT
 
 
@@ -203,18 +197,18 @@ def _search(
 
 
 def _has_lines_elsewhere(problem: Problem, result: CameraResult, response: Response) -> bool:
-    """Whether lines are clearly seen that no pose explains which was found; of a camera that moved too far, any."""
+    """True if lines are clearly seen that the found pose does not explain; any lines, if the camera moved too far."""
     paint = Paint.of(np.rint(response * 255).astype(np.uint8))
     if len(paint.middles) < LEAST_PAINT:
         return False
-    if result.refusal is not None and result.moved.beyond(problem.gate):
+    if result.refusal is not None and result.moved.exceeds_limits:
         return True
     least = LEAST_UNEXPLAINED if result.view.usable else UNEXPLAINED_BY_WEATHER
     return paint.explained_by(problem.pitch, result.camera) <= 1 - least
 
 
 def _on_its_side(markings: FieldMap, stored: Camera, found: Relocalisation, place: Place) -> Camera | None:
-    """The camera that was found, of a symmetric field the one of both that stands where it stood; None if unclear."""
+    """Return the found camera or its twin on a symmetric field, whichever stands where it stood; None if unclear."""
     if found.refusal is not None:
         return None
     camera = found.candidates[0].camera
@@ -222,30 +216,30 @@ def _on_its_side(markings: FieldMap, stored: Camera, found: Relocalisation, plac
         return camera if place.allows(camera.pose.position[None])[0] else None
     if not markings.is_symmetric:
         return camera
-    near, far = sorted((camera, twin(camera)), key=lambda one: _away_m(stored, one))
-    if _away_m(stored, near) < CLEARLY_NEARER * _away_m(stored, far):
+    near, far = sorted((camera, twin(camera)), key=lambda one: stored.distance_m(one))
+    if stored.distance_m(near) < CLEARLY_NEARER * stored.distance_m(far):
         return near
     less, more = sorted((camera, twin(camera)), key=lambda one: _turned_deg(stored, one))
     return less if _turned_deg(stored, less) < _turned_deg(stored, more) - MUCH_LESS_TURNED_DEG else None
 
 
 def _is_anothers(problem: Problem, number: int, found: Camera) -> bool:
-    """Whether the frame is rather another camera's: cables are exchanged more often than cameras."""
+    """True if the frame is rather another camera's: cables are exchanged more often than cameras."""
     return any(
         n != number
         and other.intrinsics.size == found.intrinsics.size
-        and not Moved.between(problem.pitch, other, found).beyond(problem.gate)
-        and _away_m(other, found) < _away_m(problem.cameras[number], found) + OWN_PLACE_M
+        and not Moved.between(problem.pitch, other, found).exceeds_limits
+        and other.distance_m(found) < problem.cameras[number].distance_m(found) + OWN_PLACE_M
         for n, other in enumerate(problem.cameras)
     )
 
 
-def _begun_there(problem: Problem, found: Mapping[int, FoundAgain]) -> Problem:
-    """The problem as if cameras had been stored where they were found; one that was knocked remembers nothing."""
+def _restart_from(problem: Problem, found: Mapping[int, FoundAgain]) -> Problem:
+    """Return the problem as if cameras had been stored where they were found; knocked ones without their memories."""
     cameras, memories, views = list(problem.cameras), list(problem.memories), list(problem.observed.views)
     responses = list(problem.observed.observations.responses)
     for n, one in found.items():
-        if Moved.between(problem.pitch, problem.cameras[n], one.camera).beyond(problem.gate):
+        if Moved.between(problem.pitch, problem.cameras[n], one.camera).exceeds_limits:
             memories[n] = None
         cameras[n], views[n], responses[n] = one.camera, one.view, one.response
     observations = replace(problem.observed.observations, responses=responses)
@@ -256,26 +250,24 @@ def _begun_there(problem: Problem, found: Mapping[int, FoundAgain]) -> Problem:
     return replace(problem, cameras=cameras, memories=memories, observed=observed, options=options)
 
 
-def _joined(before: Solved, again: Solved, found: Mapping[int, FoundAgain]) -> Solved:
-    """The solution with the cameras that were found, beside their stored poses; a proposed one moves no other."""
-    problem, _, judged_before, _ = before
-    observed, _, judged, _ = again
-    back = {n: _beside_stored(problem, n, judged.cameras[n], judged_before.cameras[n]) for n in found}
-    _, solution, base, _ = before if all(result.refusal is not None for result in back.values()) else again
-    results = [back.get(n, result) for n, result in enumerate(base.cameras)]
-    accepted = {result.camera.id for result in results if result.accepted}
-    pairs = [pair for pair, _ in judged.pairs if not accepted or accepted.issuperset(pair.cameras)]
-    joined = replace(
-        base.with_results(results), stitch_error_px=stitch_error_px(pairs, problem.gate), pairs=judged.pairs
-    )
-    return replace(observed, cameras=problem.cameras), solution, joined, "anywhere"
+def _merge(before: Solution, again: Solution, found: Mapping[int, FoundAgain]) -> Solution:
+    """Merge the found cameras into the solution before, beside their stored poses; a proposed one moves no other."""
+    problem = before.problem
+    results = zip(again.judged.cameras, before.judged.cameras, strict=True)
+    back = {n: _beside_stored(problem, n, *both) for n, both in enumerate(results) if n in found}
+    base = before if all(result.refusal is not None for result in back.values()) else again
+    merged = [back.get(n, result) for n, result in enumerate(base.judged.cameras)]
+    accepted = {result.camera.id for result in merged if result.accepted}
+    pairs = [pair for pair, _ in again.judged.pairs if not accepted or accepted.issuperset(pair.cameras)]
+    judged = replace(base.judged.with_results(merged), stitch_error_px=stitch_error_px(pairs), pairs=again.judged.pairs)
+    return Solution(replace(again.problem, cameras=problem.cameras), base.poses, judged, "anywhere")
 
 
 def _beside_stored(problem: Problem, number: int, result: CameraResult, before: CameraResult) -> CameraResult:
-    """The result of a camera that was found, as seen from its stored pose; refused where a person is to be asked."""
+    """Return the result of a found camera beside its stored pose; refused where a person has to be asked."""
     moved = Moved.between(problem.pitch, problem.cameras[number], result.camera)
     result = replace(result, moved=moved, evidence_before=before.evidence_before)
-    if not moved.beyond(problem.gate):
+    if not moved.exceeds_limits:
         return result
     if result.refusal is not None:
         words = f"{_turned_and_moved(moved)}, and found again there, but {result.refusal.words}"
@@ -300,20 +292,16 @@ def _proposal(result: CameraResult) -> str:
 
 
 def _is_better(problem: Problem, markings: FieldMap, result: CameraResult, found: Candidate, camera: Camera) -> bool:
-    """Whether a camera was found at another pose than it was accepted at, and with more of its lines there."""
+    """True if a camera was found at another pose than it was accepted at, with more of its lines there."""
     if found.evidence.agreement <= result.evidence.agreement:
         return False
     return not _is_same(problem, markings, result.camera, camera)
 
 
 def _is_same(problem: Problem, markings: FieldMap, one: Camera, other: Camera) -> bool:
-    """Whether two cameras put the markings that the one sees in the same places."""
+    """True if two cameras put the markings that the first one sees in the same places."""
     shift_px = mean_shift_px(problem.pitch, markings, one, other, UNSEEN_PX)
     return shift_px < SAME_PART * one.intrinsics.size[0]
-
-
-def _away_m(stored: Camera, camera: Camera) -> float:
-    return float(np.linalg.norm(camera.pose.position - stored.pose.position))
 
 
 def _turned_deg(stored: Camera, camera: Camera) -> float:

@@ -1,420 +1,182 @@
-"""The problem of a calibration and what its paths are made of: search, joint refinement, and the judgement of each
-camera by itself.
+"""Solving for the poses of all cameras: where they stood, then around it, in all colours or in the paint of a field.
+
+The cheapest explanation comes first, and the first one that the gate accepts for all cameras is the answer.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass, field, replace
-from functools import cache, partial
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
-import cv2
-import numpy as np
-
-from worker.calibration.detection.contrast import Channels
-from worker.calibration.detection.evidence import Evidence, evidence_of
-from worker.calibration.detection.exclusions import left_out, of_use
-from worker.calibration.detection.line_measurement import Measurements
-from worker.calibration.detection.ridge_response import ridge_response
-from worker.calibration.detection.view_condition import ViewCondition
-from worker.calibration.diagnostics.markings import report_markings
-from worker.calibration.diagnostics.overlap import overlap_of
-from worker.calibration.diagnostics.registration import Response
-from worker.calibration.gate.quality import MUCH_UNEXPECTED, CameraResult, Gate, Moved, alone_rejection
+from worker.calibration.diagnostics.overlap import Overlap, overlap_of
+from worker.calibration.gate.quality import GATE, MUCH_UNEXPECTED
 from worker.calibration.geometry.camera import Camera
-from worker.calibration.geometry.field import Field
-from worker.calibration.geometry.parameters import Parameter, free_focal_lengths, free_ridge
-from worker.calibration.geometry.visibility import VisibleLines
-from worker.calibration.memory.camera_memory import CameraMemory
-from worker.calibration.records import NOT_RECORDED, Options, ProgressReporter, Recorder
-from worker.calibration.refinement.diagnosis import is_sure
-from worker.calibration.refinement.refine import SEARCH_PX, LineReader, Observations, evaluate_poses, refine
-from worker.calibration.refinement.uncertainty import Deviation, RefinedPose, RefinedPoses
-from worker.calibration.search.genome import genome_of
-from worker.calibration.search.objective import Objective
-from worker.calibration.search.search import COARSE_TO_FINE, Found, Strategy, search
-
-CAPTURE_RAD = 0.1
-"""How far a line may be from where the stored pose expects it: 4 degrees of rotation and 0.3 m at 15 m."""
-LEAST_CAUGHT = 0.6
-"""Share of the expected lines that has to be caught in the frame for lines alone to suffice."""
-MOST_CAUGHT, CLEARLY_MORE, MOST_AGAIN = 0.9, 0.02, 3
-"""Agreement with the lines below which a finish is begun again from where it ended, by how much it has to grow with
-that, and how often it may."""
-HARDLY_MOVED_PX = 12.0
-"""How far the visible lines may have moved on average, in pixels of a 4K frame, of a camera that stands almost where it
-is stored: within what the refinement catches."""
-DOUBTFUL = 0.75
-"""Agreement below which an accepted camera that moved may have been knocked, and caught by wrong lines."""
-SEARCHED_POWER = 3
-"""Power of the network's responses in the search: what it half believes (a shadow's edge, a board) hardly pulls."""
+from worker.calibration.joint_verdict import judge_together
+from worker.calibration.near_path import NearSolution, refine_by_lines
+from worker.calibration.observe import FrameObserver
+from worker.calibration.paint_path import (
+    around_stored_poses,
+    at_stored_poses,
+    log_odds,
+    show_paint_of_field,
+)
+from worker.calibration.problem import PoseSolution, Problem, Solution
+from worker.calibration.records import EngineResult, Path, ProgressReporter
+from worker.calibration.steps import evidence_at, refine_without, shows_most_lines, with_unusable_cameras
+from worker.calibration.swapped_cameras import mark_swapped_frames
+from worker.calibration.wide_path import NO_CAMERAS, search_and_refine, search_in_overviews
+from worker.calibration.zoom_refit import refit_zoomed
 
 
-@dataclass(frozen=True)
-class ObservedCameras:
-    """The condition of each camera's view (`views`), and its frames and network response (`observations`).
+def solve(problem: Problem, observer: FrameObserver, progress: ProgressReporter) -> tuple[Solution, FrameObserver]:
+    """Solve for the poses of all cameras, in all colours of their frames or in the paint of the field.
 
-    `in_full`: numbers of the cameras that the network has looked at in full; of the others it has an empty response,
-    and where it was asked for one, `overviews`: its response (h, w) in 0..1 to a reduced frame.
+    Also return the frames that the solution explains. Other sports' lines are in view of all cameras of a floor, where
+    a camera that was turned is alone: only then is a paint looked for.
     """
+    problem = observer.with_overviews(problem, progress)
+    near = _refine_near(problem, progress)
+    solution = _solve_near(problem, near, progress)
+    if solution is not None:
+        return solution, observer
 
-    views: Sequence[ViewCondition]
-    observations: Observations
-    overviews: Sequence[Response | None]
-    in_full: Collection[int]
+    # Where the cameras stood, in one paint.
+    if problem.options.search == "auto" and _stand_among_other_lines(problem):
+        painted = show_paint_of_field(problem, observer, at_stored_poses, progress.muted())
+        solution = None if painted is None else _solve_near_in(painted, problem, progress)
+        if painted is not None and solution is not None:
+            return solution, painted
 
-    def of(self, numbers: Sequence[int]) -> ObservedCameras:
-        """Return the observations of some of the cameras."""
-        return ObservedCameras(
-            [self.views[n] for n in numbers],
-            self.observations.of(numbers),
-            [self.overviews[n] for n in numbers],
-            [at for at, n in enumerate(numbers) if n in self.in_full],
-        )
-
-    def seen(self, number: int) -> tuple[Channels, Response]:
-        """Return the channels of the frames of a camera, and the network's response (H, W) to them."""
-        return self.observations.channels[number], self.observations.responses[number]
-
-    def seen_by_network(self, number: int) -> Response:
-        """Return the network's response (h, w) to the frame of a camera, or else to its overview."""
-        overview = self.overviews[number]
-        return self.observations.responses[number] if overview is None or number in self.in_full else overview
-
-
-@dataclass(frozen=True)
-class Problem:
-    """Inputs of a calibration: a pitch, cameras at their stored poses, and per camera its observations and memory."""
-
-    pitch: Field
-    cameras: Sequence[Camera]
-    observed: ObservedCameras
-    options: Options
-    memories: Sequence[CameraMemory | None]
-    gate: Gate = field(default_factory=Gate)
-    recorder: Recorder = NOT_RECORDED
-
-    def of(self, numbers: Sequence[int]) -> Problem:
-        """Return the problem of some of the cameras."""
-        cameras, memories = [self.cameras[n] for n in numbers], [self.memories[n] for n in numbers]
-        return replace(self, cameras=cameras, observed=self.observed.of(numbers), memories=memories)
-
-    @property
-    def usable(self) -> list[int]:
-        """Numbers of the cameras whose frames can be used."""
-        return [n for n, view in enumerate(self.observed.views) if view.usable]
+    # Around it, in all colours and then in one paint.
+    solution = _solve_farther(problem, near, observer, progress)
+    problem, judged = solution.problem, solution.judged
+    if not _are_mostly_others([judged.cameras[n].overlap for n in problem.usable]):
+        return solution, observer
+    painted = show_paint_of_field(problem, observer, around_stored_poses, progress.muted())
+    if painted is None:
+        return solution, observer
+    seen = painted.with_overviews(painted.seen_in(problem), progress)
+    again = _solve_around(seen, painted, range(len(problem.cameras)), NO_CAMERAS, progress)
+    return (again, painted) if _is_likelier(again, solution) else (solution, observer)
 
 
-@dataclass(frozen=True)
-class PoseSolution:
-    """Cameras with refined poses on their pitch, each judged by itself by the gate.
+def solve_in_all_colours(problem: Problem, observer: FrameObserver, progress: ProgressReporter) -> Solution:
+    """Solve for the poses of all cameras by all that their frames show."""
+    problem = observer.with_overviews(problem, progress)
+    near = _refine_near(problem, progress)
+    return _solve_near(problem, near, progress) or _solve_farther(problem, near, observer, progress)
 
-    `begun`: the pose from which each was refined; `together`: numbers of the cameras that were refined jointly, the
-    others stand by themselves; `deviations`: what the lines say of lenses and field; `generations` of the search.
+
+def _refine_near(problem: Problem, progress: ProgressReporter) -> NearSolution | None:
+    """Refine the cameras that stand almost where they stood; None if none do, or a search was asked for."""
+    return refine_by_lines(problem, progress) if problem.options.search == "auto" else None
+
+
+def _solve_farther(
+    problem: Problem, near: NearSolution | None, observer: FrameObserver, progress: ProgressReporter
+) -> Solution:
+    """Search for the cameras that are not `near` their stored poses.
+
+    Lines are asked first, and the network looks in full where they do not suffice. Cameras that are all near contradict
+    each other: none of them is known to be right.
     """
+    everyone = range(len(problem.cameras))
+    if near is None or near.numbers == problem.usable:
+        near, lost = None, list(everyone)
+    else:
+        lost = [n for n in everyone if n not in near.numbers]
+    problem = replace(problem, observed=mark_swapped_frames(problem, lost, observer.frames, progress))
+    # All that are lost may have frames of other cameras: then those that are near are all there are.
+    solution = _solve_near(problem, near, progress)
+    if solution is not None:
+        return solution
+    return _solve_around(problem, observer, lost, NO_CAMERAS if near is None else near.cameras, progress)
 
-    pitch: Field
-    begun: list[Camera]
-    results: list[CameraResult]
-    together: list[int]
-    deviations: list[Deviation]
-    generations: int
+
+def _stand_among_other_lines(problem: Problem) -> bool:
+    """True if the stored poses of all usable cameras see the field's lines, and mostly others beside them."""
+    group = problem.of(problem.usable)
+    seen = [group.observed.seen_by_network(n) for n in range(len(group.cameras))]
+    cameras = [camera.resized(of.shape[1]) for camera, of in zip(group.cameras, seen, strict=True)]
+    overlaps = [overlap_of(group.pitch, camera, of) for camera, of in zip(cameras, seen, strict=True)]
+    reader = group.observed.observations.reader()
+    return _are_mostly_others(overlaps) and all(shows_most_lines(group.pitch, group.cameras, reader))
 
 
-def with_unusable_cameras(
+def _are_mostly_others(overlaps: Sequence[Overlap]) -> bool:
+    """True if each camera sees mostly lines that are not the field's."""
+    return bool(overlaps) and all(one.unexpected >= MUCH_UNEXPECTED for one in overlaps)
+
+
+def _solve_near_in(painted: FrameObserver, problem: Problem, progress: ProgressReporter) -> Solution | None:
+    """Return the solution at the stored poses of a problem in `painted` frames; None unless it is accepted.
+
+    Less is seen of the field's lines in one paint: in all colours the stored poses may not fit better.
+    """
+    seen = painted.with_overviews(painted.seen_in(problem), progress)
+    solution = _solve_near(seen, _refine_near(seen, progress), progress)
+    if solution is None:
+        return None
+    for n in problem.usable:
+        stored, found = problem.cameras[n], solution.judged.cameras[n].camera
+        before, after = (evidence_at(problem, n, camera).agreement for camera in (stored, found))
+        if after < before - GATE.agreement_loss:
+            return None
+    return solution
+
+
+def _is_likelier(in_paint: Solution, in_all: Solution) -> bool:
+    """True if the solution in one paint is likelier in all colours, too; less is seen of the field's lines in one."""
+    # What passes neither way is looked for elsewhere, by all that is seen.
+    passes = any(one.accepted for one in [*in_all.judged.cameras, *in_paint.judged.cameras])
+    return passes and _log_odds(in_all.problem, in_paint.judged) > _log_odds(in_all.problem, in_all.judged)
+
+
+def _solve_near(problem: Problem, near: NearSolution | None, progress: ProgressReporter) -> Solution | None:
+    """Return the solution at the stored poses; None unless all usable cameras are near and accepted together."""
+    if near is None or near.numbers != problem.usable:
+        return None
+    poses = with_unusable_cameras(problem, problem.cameras, near.refined, near.results, 0, progress)
+    return _accepted_together(problem, poses, "near", progress)
+
+
+def _solve_around(
     problem: Problem,
-    begun: Sequence[Camera],
-    refined: RefinedPoses,
-    results: Sequence[CameraResult],
-    generations: int,
+    observer: FrameObserver,
+    lost: Sequence[int],
+    near: Mapping[int, Camera],
     progress: ProgressReporter,
-) -> PoseSolution:
-    """Return the solution when all usable cameras were refined from where they `begun`; the others are assessed at
-    their stored poses. `results`: those of the usable ones."""
-    together = problem.usable
-    by_number = dict(zip(together, results, strict=True))
-    in_order = [
-        by_number[n] if n in by_number else assess_stored(problem.of([n]), progress).result
-        for n in range(len(problem.cameras))
-    ]
-    return PoseSolution(refined.pitch, list(begun), in_order, together, refined.deviations, generations)
-
-
-def joined_deviations(together: RefinedPoses, apart: Sequence[RefinedPoses]) -> list[Deviation]:
-    """Return deviations of lenses and field: of a camera that stands apart its own, the others of those `together`."""
-    of_lenses = [deviation for one in apart for deviation in one.deviations if deviation.camera is not None]
-    apart_ids = {deviation.camera for deviation in of_lenses}
-    return [deviation for deviation in together.deviations if deviation.camera not in apart_ids] + of_lenses
-
-
-@dataclass(frozen=True)
-class Attempt:
-    """A camera that was refined by itself, from the pose `begun`."""
-
-    begun: Camera
-    refined: RefinedPoses
-    result: CameraResult
-
-    @property
-    def agreement(self) -> float:
-        """Agreement 0..1 of the frame with the expected lines at the refined pose (see `Evidence`)."""
-        return self.result.evidence.agreement
-
-
-def single_camera_problem(problem: Problem, number: int) -> Problem:
-    """Return the problem of one camera, which does not solve for the ridge unless it is the only camera."""
-    ridge = problem.options.fit_ridge and len(problem.cameras) == 1
-    return replace(problem.of([number]), options=replace(problem.options, fit_ridge=ridge))
-
-
-def best_attempt(problem: Problem, found: Camera, progress: ProgressReporter) -> Attempt:
-    """Refine a single camera from where the joint search `found` it, and while it fails the gate from other poses."""
-    best = _attempt(problem, found, progress)
-    for start in _other_starts(problem, progress, lost=best.agreement < problem.gate.least_agreement):
-        if best.result.accepted:
-            break
-        best = max(best, _attempt(problem, start, progress), key=lambda attempt: attempt.agreement)
-    return best
-
-
-def _other_starts(problem: Problem, progress: ProgressReporter, *, lost: bool) -> Iterator[Camera]:
-    """Yield the pose that a search by ridges finds, if the camera is `lost`, and its stored pose."""
-    if lost:
-        yield search_poses(problem, ridge_responses(problem), progress).cameras[0]
-    yield problem.cameras[0]
-
-
-def _attempt(problem: Problem, begun: Camera, progress: ProgressReporter) -> Attempt:
-    refined = refine_poses(problem, [begun], problem.observed.observations, progress)
-    return Attempt(begun, refined, judge_each(problem, refined, progress)[0])
-
-
-def assess_stored(problem: Problem, progress: ProgressReporter) -> Attempt:
-    """Assess a single camera whose frame cannot be used at its stored pose."""
-    with progress.timed("refinement"):
-        assessed = evaluate_poses(
-            problem.pitch,
-            problem.cameras,
-            problem.observed.observations,
-            free_parameters(problem),
-            memories=problem.memories,
-        )
-    return Attempt(problem.cameras[0], assessed, judge_each(problem, assessed, progress)[0])
-
-
-def search_poses(problem: Problem, responses: Sequence[Response], progress: ProgressReporter) -> Found:
-    """Search from the stored poses by the `responses` (h, w) to the frames of the cameras or to reduced ones."""
-    options = problem.options
-    reduced = [camera.resized(seen.shape[1]) for camera, seen in zip(problem.cameras, responses, strict=True)]
-    with progress.timed("evolution"):
-        found = search(
-            problem.pitch,
-            reduced,
-            responses,
-            Strategy(options.parents, options.offspring, options.generations),
-            np.random.default_rng(options.seed),
-            progress.evolution(options.generations),
-            lambda level, genomes, best: problem.recorder.searched(problem.cameras, level, genomes, best),
-        )
-    in_full = [camera.with_pose(one.pose) for camera, one in zip(problem.cameras, found.cameras, strict=True)]
-    return replace(found, cameras=in_full)
-
-
-def network_responses(problem: Problem) -> list[Response]:
-    """Return the network's responses (h, w) in 0..1 as the search uses them, raised to `SEARCHED_POWER`."""
-    return raised([problem.observed.seen_by_network(n) for n in range(len(problem.cameras))])
-
-
-def raised(responses: Sequence[Response]) -> list[Response]:
-    """Return responses (H, W) raised to `SEARCHED_POWER`."""
-    return [np.asarray(cv2.pow(response, SEARCHED_POWER), dtype=np.float32) for response in responses]
-
-
-def ridge_responses(problem: Problem) -> list[Response]:
-    """Return the ridge responses (H, W) that the search uses where those of the network lead nowhere."""
-    channels = problem.observed.observations.channels
-    return [ridges_of(problem.pitch, camera, of) for camera, of in zip(problem.cameras, channels, strict=True)]
-
-
-def ridges_of(pitch: Field, camera: Camera, channels: Channels) -> Response:
-    """Return the ridge response (H, W) of a frame wherever the network would look for markings."""
-    lines = VisibleLines.from_camera(pitch.line_points(), camera)
-    return of_use(camera.ignored, ridge_response(channels, lines, CAPTURE_RAD * camera.intrinsics.focal_length_px))
-
-
-def refine_and_judge(
-    problem: Problem, begun: Sequence[Camera], progress: ProgressReporter
-) -> tuple[RefinedPoses, list[CameraResult]]:
-    """Refine the cameras jointly from where they were found (`begun`), and judge each by itself.
-
-    By lines alone, as the near path does: so that both end in one place. Where a camera does not pass so, with what the
-    network has seen of them.
-    """
-    by_lines = Observations.of_lines_alone(problem.observed.observations.channels)
-    refined = refine_poses(problem, begun, by_lines, progress)
-    results = judge_each(problem, refined, progress)
-    if all(result.accepted for result in results):
-        return refined, results
-    refined = refine_poses(problem, begun, problem.observed.observations, progress)
-    return refined, judge_each(problem, refined, progress)
-
-
-def refine_poses(
-    problem: Problem, begun: Sequence[Camera], observations: Observations, progress: ProgressReporter
-) -> RefinedPoses:
-    """Refine the cameras jointly onto the lines of these `observations`, from where they were found (`begun`).
-
-    Where one of them ends without some of its lines, again from there while more are found: lines beside which the
-    search for them has narrowed are found from where the others led.
-    """
-    with progress.timed("refinement"):
-        progress.at("refinement", 0.0)
-        free = free_parameters(problem)
-        refined = _refined_from(problem, begun, observations, free)
-        # What is solved for beside the poses would be as open once more as it was at first.
-        if free:
-            return refined
-        for _ in range(MOST_AGAIN):
-            if _weakest_agreement(refined) >= MOST_CAUGHT:
-                break
-            again = _refined_from(problem, refined.cameras, observations, free)
-            if _weakest_agreement(again) < _weakest_agreement(refined) + CLEARLY_MORE:
-                break
-            refined = again
-        return refined
-
-
-def _refined_from(
-    problem: Problem, begun: Sequence[Camera], observations: Observations, free: Sequence[Parameter]
-) -> RefinedPoses:
-    weight, memories = problem.options.stitch_weight, problem.memories
-    return refine(problem.pitch, begun, observations, weight, free, stored=problem.cameras, memories=memories)
-
-
-def _weakest_agreement(refined: RefinedPoses) -> float:
-    return min(one.evidence.agreement for one in refined.each)
-
-
-def refine_without(
-    excluded: Collection[int], problem: Problem, solution: PoseSolution, progress: ProgressReporter
-) -> PoseSolution:
-    """Refine the other cameras without those `excluded` ones that were refined with them; these stay as they are."""
-    together = [n for n in solution.together if n not in excluded]
-    if len(together) in (0, len(solution.together)):
-        return replace(solution, together=together)
-    group = problem.of(together)
-    refined, judged = refine_and_judge(group, [solution.begun[n] for n in together], progress)
-    results = dict(enumerate(solution.results)) | dict(zip(together, judged, strict=True))
-    ids = {problem.cameras[n].id for n in together}
-    of_others = [d for d in solution.deviations if d.camera is not None and d.camera not in ids]
-    return replace(
-        solution,
-        pitch=refined.pitch,
-        results=list(results.values()),
-        together=together,
-        deviations=refined.deviations + of_others,
-    )
-
-
-def is_doubtful(result: CameraResult) -> bool:
-    """Whether so few of its lines are found that a camera which is accepted may stand elsewhere.
-
-    One that stands almost where it is stored was not knocked: its lines are faint every night.
-    """
-    return result.evidence.agreement < DOUBTFUL and not has_hardly_moved(result)
-
-
-def has_hardly_moved(result: CameraResult) -> bool:
-    """Whether a camera stands almost where it is stored."""
-    return result.moved.pixels <= HARDLY_MOVED_PX * result.camera.intrinsics.relative_size
-
-
-def free_parameters(problem: Problem) -> list[Parameter]:
-    """Return the numbers of lenses and field that the options ask to solve for along with the poses."""
-    lengths = free_focal_lengths(problem.cameras) if problem.options.fit_focal_length else []
-    return [*lengths, *(free_ridge(problem.pitch) if problem.options.fit_ridge else [])]
-
-
-def judge_each(problem: Problem, refined: RefinedPoses, progress: ProgressReporter) -> list[CameraResult]:
-    """Judge each refined camera by itself beside its stored pose, on the pitch that it was refined with."""
-    with progress.timed("quality"):
-        return [_judge(problem, number, refined.pitch, after) for number, after in enumerate(refined.each)]
-
-
-def _judge(problem: Problem, number: int, pitch: Field, after: RefinedPose) -> CameraResult:
-    stored, memory = problem.cameras[number], problem.memories[number]
-    channels, response = problem.observed.seen(number)
-    seen = problem.observed.seen_by_network(number)
-    result = CameraResult(
-        **vars(after),
-        view=problem.observed.views[number],
-        overlap=overlap_of(pitch, after.camera.resized(seen.shape[1]), seen),
-        evidence_before=cache(partial(evidence_at, problem, number, stored)),
-        moved=Moved.between(problem.pitch, stored, after.camera),
-        markings=report_markings(pitch, after, channels, response),
-        moved_in_all=None if memory is None else Moved.between(problem.pitch, memory.origin, after.camera),
-    )
-    return replace(result, refusal=alone_rejection(result, problem.gate))
-
-
-def shows_most_lines(pitch: Field, cameras: Sequence[Camera], reader: LineReader) -> list[bool]:
-    """Say of each camera whether its frame shows most of the lines near to where the camera expects them."""
-    lines = pitch.line_points()
-    measured = reader.measure(lines, cameras, SEARCH_PX[0])
-    return [
-        _measured_share(VisibleLines.from_camera(lines, camera), found) >= LEAST_CAUGHT
-        for camera, found in zip(cameras, measured, strict=True)
-    ]
-
-
-def _measured_share(expected: VisibleLines, found: Measurements) -> float:
-    """Return the share 0..1 of the expected length that was measured; lines below a pixel count by their width."""
-    weight = expected.length_px * np.minimum(expected.width_px, 1.0)
-    return float(np.sum(weight[np.isin(expected.index, found.index)]) / max(np.sum(weight), 1e-12))
-
-
-def is_confirmed(problem: Problem, number: int, result: CameraResult) -> bool:
-    """True unless most of the lines that the network sees on the pitch lie where the camera expects none.
-
-    Asked of overviews; where the network has looked in full, evidence and gate have.
-    """
-    return number in problem.observed.in_full or result.overlap.unexpected < MUCH_UNEXPECTED
-
-
-def follows_zoom(problem: Problem, result: CameraResult) -> bool:
-    """True if a lens that may drift has surely done so."""
-    return problem.options.lens_may_drift and result.zoom is not None and is_sure(result.zoom)
-
-
-def evidence_at(problem: Problem, number: int, camera: Camera) -> Evidence:
-    """Return how much of the field's lines the frames of a camera show where it stands as `camera` does."""
-    pitch = problem.pitch
-    return evidence_of(pitch.line_points(), camera, *problem.observed.seen(number), left_out(pitch, camera))
-
-
-def loss_of(problem: Problem, pitch: Field, answered: Sequence[Camera]) -> float:
-    """Return the loss of the search's middle level at the answered poses, inf if no frame can be used.
-
-    A finer level looks at larger pictures, which takes a third of a second to say hardly more.
-    """
-    group = problem.usable
-    if not group:
-        return float("inf")
-    seen = [problem.observed.seen_by_network(n) for n in group]
-    cameras = [answered[n].resized(response.shape[1]) for n, response in zip(group, seen, strict=True)]
-    responses = of_use_at(cameras, raised(seen), pitch)
-    blur_px = COARSE_TO_FINE[1].blur_px
-    losses = [
-        Objective.build(pitch, camera, response, blur_px).losses(genome_of([camera])[None])[0]
-        for camera, response in zip(cameras, responses, strict=True)
-    ]
-    return float(np.mean(losses))
-
-
-def of_use_at(cameras: Sequence[Camera], responses: Sequence[Response], pitch: Field) -> list[Response]:
-    """Return the responses (H, W) with 0 where nothing is looked at from the poses of the cameras."""
-    areas = [left_out(pitch, camera) for camera in cameras]
-    return [
-        response if out is None else np.where(out, np.float32(0), response)
-        for response, out in zip(responses, areas, strict=True)
-    ]
+) -> Solution:
+    """Search around their stored poses for the `lost` cameras; `near` holds the others at their refined poses."""
+    poses = search_in_overviews(problem, progress, near)
+    solution = None if poses is None else _accepted_together(problem, poses, "wide", progress)
+    if solution is not None:
+        return solution
+
+    # By all that the network sees.
+    problem = observer.look_in_full(problem, lost, progress)
+    poses = refit_zoomed(problem, search_and_refine(problem, progress, near), progress)
+    while True:
+        judged = judge_together(problem, poses.pitch, poses.results, progress)
+        contradicted = [n for n in poses.together if not judged.cameras[n].accepted]
+        if len(contradicted) in (0, len(poses.together)):
+            return Solution(problem, poses, judged, "wide")
+        # A camera that the others contradict must not have pulled at them.
+        poses = refine_without(contradicted, problem, poses, progress)
+
+
+def _accepted_together(
+    problem: Problem, poses: PoseSolution, path: Path, progress: ProgressReporter
+) -> Solution | None:
+    """Judge the cameras against each other; None unless all that were refined together are accepted."""
+    judged = judge_together(problem, poses.pitch, poses.results, progress)
+    is_accepted = all(judged.cameras[n].accepted for n in poses.together)
+    return Solution(problem, poses, judged, path) if is_accepted else None
+
+
+def _log_odds(problem: Problem, judged: EngineResult) -> float:
+    """Return how much likelier judged poses are than ones that chance finds, by the frames of a problem, in nats."""
+    usable = problem.usable
+    cameras = [judged.cameras[n].camera for n in usable]
+    shares = [evidence_at(problem, n, camera).agreement for n, camera in zip(usable, cameras, strict=True)]
+    return log_odds(problem.of(usable), cameras, shares)

@@ -9,26 +9,18 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from worker.calibration.detection.view_condition import ViewCondition, look_at
 from worker.calibration.gate.quality import CameraResult
 from worker.calibration.geometry.camera import Camera, Frame
+from worker.calibration.problem import ObservedCameras, Problem
 from worker.calibration.records import NOT_RECORDED, ProgressReporter
-from worker.calibration.solve import (
-    ObservedCameras,
-    Problem,
-    best_attempt,
-    ridge_responses,
-    search_poses,
-    single_camera_problem,
-)
+from worker.calibration.steps import best_attempt, ridge_responses, search_poses, single_camera_problem
 
 MOST_OF_ITS_OWN, LEAST_OF_ANOTHER = 0.3, 0.6
 """Share of the expected places at which a line is seen: a frame of which its own camera has more is not asked about,
 and one of which another camera has less is not tried there."""
 NEARER_BY_SIGMAS = 3.0
-"""A camera that was turned until it sees what its neighbour sees is told by where it stands."""
+"""A camera that was turned until it sees what its neighbour sees still stands in its own place."""
 
 
 def mark_swapped_frames(
@@ -92,8 +84,8 @@ def _result_as(
 
 
 def _stands_nearer(result: CameraResult, own: Camera, other: Camera) -> bool:
-    """Whether a camera that was found from the other one's pose stands where its own stored pose says."""
-    to_own, to_other = (float(np.linalg.norm(result.camera.pose.position - c.pose.position)) for c in (own, other))
+    """True if a camera that was found from the other one's pose stands nearer to its own stored place."""
+    to_own, to_other = map(result.camera.distance_m, (own, other))
     sigma = 0.0 if result.sigma is None else result.sigma.position_m
     return to_own + NEARER_BY_SIGMAS * sigma < to_other
 

@@ -14,13 +14,12 @@ from types import MappingProxyType
 import numpy as np
 
 from worker.calibration.geometry.camera import Camera
+from worker.calibration.problem import PoseSolution, Problem
 from worker.calibration.records import ProgressReporter
 from worker.calibration.refinement.refine import Observations
 from worker.calibration.refinement.uncertainty import RefinedPoses
 from worker.calibration.search.search import Found
-from worker.calibration.solve import (
-    PoseSolution,
-    Problem,
+from worker.calibration.steps import (
     assess_stored,
     best_attempt,
     follows_zoom,

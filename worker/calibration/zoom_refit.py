@@ -11,16 +11,10 @@ from dataclasses import replace
 
 from worker.calibration.gate.quality import CameraResult, Refusal, zoom_in_words, zoomed_beyond_doubt
 from worker.calibration.geometry.camera import Camera
+from worker.calibration.problem import PoseSolution, Problem
 from worker.calibration.records import ProgressReporter
 from worker.calibration.refinement.diagnosis import is_sure
-from worker.calibration.solve import (
-    PoseSolution,
-    Problem,
-    judge_each,
-    refine_poses,
-    refine_without,
-    single_camera_problem,
-)
+from worker.calibration.steps import judge_each, refine_poses, refine_without, single_camera_problem
 
 MOST_ROUNDS = 5
 LEAST_SIGMAS = 2.0
@@ -49,7 +43,7 @@ def _needs_refit(problem: Problem, result: CameraResult) -> bool:
     """True for a lens that may drift as soon as it surely has; for another one only beyond the gate's doubt."""
     if problem.options.lens_may_drift and result.accepted:
         return result.zoom is not None and is_sure(result.zoom)
-    return zoomed_beyond_doubt(result, problem.gate)
+    return zoomed_beyond_doubt(result)
 
 
 def _refitted(problem: Problem, number: int, result: CameraResult, progress: ProgressReporter) -> CameraResult | None:

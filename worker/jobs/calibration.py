@@ -186,7 +186,7 @@ def _result(
         warnings=[*(words for camera in venue.cameras for words in lens_warnings(camera)), *job.remarks],
         stitch_error_px=finite_or_none(found.stitch_error_px),
         stitch_error_before_px=finite_or_none(found.stitch_error_before_px),
-        stitch_error_limit_px=quality.Gate().largest_stitch_error_px,
+        stitch_error_limit_px=quality.GATE.largest_stitch_error_px,
         pairs=[pair_to_schema(*pair) for pair in found.pairs],
         loss=finite_or_none(found.loss),
         generations=found.generations,

@@ -17,7 +17,7 @@ from worker.calibration.detection.view_condition import look_at
 from worker.calibration.geometry.camera import Camera, inside
 from worker.calibration.geometry.field import LinePoints
 from worker.calibration.records import Segment
-from worker.calibration.solve import CAPTURE_RAD
+from worker.calibration.steps import CAPTURE_RAD
 
 SAMPLE_M = 0.1
 AROUND_M = 0.5

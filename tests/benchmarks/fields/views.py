@@ -18,7 +18,7 @@ from tests.benchmarks.fields.judging import reasons, share
 from tests.benchmarks.fields.rendered import LEAST_SHOWN, shot
 from tests.benchmarks.truth import apart
 from worker.calibration.detection.view_condition import UsualView, look_at
-from worker.calibration.gate.quality import Gate
+from worker.calibration.gate.quality import GATE
 from worker.calibration.geometry.camera import Camera, Frame, Pose, inside
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.rotation import rotation_vectors
@@ -137,7 +137,7 @@ def _other(view: View, views: Sequence[View]) -> View | None:
 
 def _out_of_reach(camera: Camera, start: Camera) -> bool:
     metres, degrees = apart(camera, start)
-    return metres > 2 * Gate().largest_shift_m or degrees > 2 * Gate().largest_rotation_deg
+    return metres > 2 * GATE.largest_shift_m or degrees > 2 * GATE.largest_rotation_deg
 
 
 def _is_its_own_mirror_image(view: View) -> bool:

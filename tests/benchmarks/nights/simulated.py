@@ -17,7 +17,7 @@ from worker.calibration.detection.evidence import Evidence
 from worker.calibration.detection.line_measurement import Measurements
 from worker.calibration.detection.view_condition import ViewCondition, ViewFigures
 from worker.calibration.diagnostics.overlap import Overlap
-from worker.calibration.gate.quality import CameraResult, Gate, Moved, alone_rejection
+from worker.calibration.gate.quality import CameraResult, Moved, alone_rejection
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.field import Field, LinePoints
 from worker.calibration.geometry.ground import Ground
@@ -168,4 +168,4 @@ class Installation:
             )
             for stored, after, was, memory in zip(self.stored, finished.each, before, self.memories, strict=True)
         ]
-        return [replace(result, refusal=alone_rejection(result, Gate())) for result in results]
+        return [replace(result, refusal=alone_rejection(result)) for result in results]

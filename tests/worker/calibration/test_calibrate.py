@@ -8,7 +8,7 @@ import pytest
 
 from tests.worker.calibration.synthetic import CROWNED, moved, pair, pair_frames
 from worker.calibration.calibrate import calibrate
-from worker.calibration.gate.quality import Gate, ridge_rejection
+from worker.calibration.gate.quality import ridge_rejection
 from worker.calibration.geometry.parameters import free_focal_lengths
 from worker.calibration.geometry.rotation import rotation_angles_deg
 from worker.calibration.records import CalibrationError, Options, Stopped
@@ -188,9 +188,9 @@ def test_a_flat_pitch_that_is_crowned_is_told_with_how_far_the_true_ridge_moves_
 
 
 def test_a_ridge_below_the_ground_is_rejected():
-    assert "ridge at -0.100 m" in ridge_rejection(CROWNED.raised(-0.45), Gate()).words
-    assert ridge_rejection(CROWNED, Gate()) is None
-    assert ridge_rejection(CROWNED.flat(), Gate()) is None
+    assert "ridge at -0.100 m" in ridge_rejection(CROWNED.raised(-0.45)).words
+    assert ridge_rejection(CROWNED) is None
+    assert ridge_rejection(CROWNED.flat()) is None
 
 
 def test_a_camera_that_sees_something_else_is_rejected_and_says_nothing_of_its_lens():

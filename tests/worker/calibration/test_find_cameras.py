@@ -11,7 +11,7 @@ from tests.worker.calibration.gate.test_quality import good
 from tests.worker.calibration.synthetic import CROWNED, PITCH, moved, paint_frame, pair, pair_frames, worn
 from tests.worker.calibration.test_calibrate import white_on_green
 from worker.calibration.find_cameras import FoundCamera, find_cameras, why_lens_unfit, why_not_confirmed
-from worker.calibration.gate.quality import Gate
+from worker.calibration.gate.quality import GATE
 from worker.calibration.geometry.rotation import rotation_angles_deg
 from worker.calibration.records import Stopped
 from worker.calibration.refinement.diagnosis import find_suspicions
@@ -110,7 +110,7 @@ def test_a_flat_field_stays_flat_and_a_field_with_a_known_camera_as_it_is_given(
 
 
 def test_lines_have_to_fit_better_through_a_lens_that_was_found_with_the_pose():
-    most_px = Gate().most_residual_px(good().camera)
+    most_px = GATE.most_residual_px(good().camera)
     fits_hardly = replace(good(), residual_px=0.95 * most_px)
     assert why_not_confirmed(fits_hardly, is_lens_found=False) is None
     assert "are the measures of the field quite right?" in why_not_confirmed(fits_hardly, is_lens_found=True)

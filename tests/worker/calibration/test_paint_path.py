@@ -8,14 +8,14 @@ import pytest
 from fields.template import load
 from models import MODEL_PATH
 from tests.worker.calibration.synthetic import GRASS, PAINTS, camera, moved, paint_markings
-from worker.calibration import calibrate as engine
+from worker.calibration import solve
 from worker.calibration.calibrate import calibrate
 from worker.calibration.detection.segmentation import Segmenter
 from worker.calibration.gate.quality import Moved
 from worker.calibration.geometry.field import Field
 from worker.calibration.paint_path import log_odds
+from worker.calibration.problem import Problem
 from worker.calibration.records import Options
-from worker.calibration.solve import Problem
 
 pytestmark = pytest.mark.slow
 
@@ -59,6 +59,14 @@ def test_of_several_frames_the_paint_is_seen_in_one():
     assert off_px(result) < 0.5
 
 
+def test_a_camera_that_stands_where_it_stood_needs_no_search():
+    stored = moved(calibrated().camera, (0.0004, -0.0003, 0.0002), (0.002, 0.001, -0.002))
+    found = calibrate(NETBALL, [stored], {"hall": [frame()]}, Segmenter(MODEL_PATH, 1), Options())
+    assert (found.path, found.generations, found.in_full) == ("near", 0, [])
+    assert found.cameras[0].accepted, found.cameras[0].rejected_because
+    assert off_px(found.cameras[0]) < 0.5
+
+
 def test_the_lines_of_the_others_are_none_that_nobody_expects():
     assert calibrated().overlap.unexpected < 0.2
 
@@ -78,7 +86,7 @@ def test_a_pose_loses_by_how_far_its_camera_would_have_moved_what_it_gains_by_li
 
 def test_without_their_colour_the_pose_is_drawn_to_lines_of_the_others(monkeypatch):
     """This floor is as hard as it is meant to be."""
-    monkeypatch.setattr(engine, "show_paint_of_field", lambda *_: None)
+    monkeypatch.setattr(solve, "show_paint_of_field", lambda *_: None)
     options = Options(recover="never")
     result = calibrate(NETBALL, [STORED], {"hall": [frame()]}, Segmenter(MODEL_PATH, 1), options).cameras[0]
     assert off_px(result) > 1.5

@@ -19,13 +19,13 @@ from worker.calibration.gate.quality import Refusal
 from worker.calibration.geometry.camera import Camera, Pose
 from worker.calibration.geometry.lens import Intrinsics
 from worker.calibration.geometry.rotation import rotation_angles_deg, rotation_matrices, rotation_vectors
+from worker.calibration.problem import Problem
 from worker.calibration.records import Options, Stopped
 from worker.calibration.relocalisation import candidate
 from worker.calibration.relocalisation.candidate import Candidate
 from worker.calibration.relocalisation.field_map import FieldMap
 from worker.calibration.relocalisation.relocalise import NotFound, Relocalisation, twin
 from worker.calibration.relocalisation.sought import ANYWHERE
-from worker.calibration.solve import Problem
 
 pytestmark = pytest.mark.slow
 

@@ -8,9 +8,10 @@ from worker.calibration import solve
 from worker.calibration.detection.contrast import Channels
 from worker.calibration.geometry.camera import Pose
 from worker.calibration.geometry.rotation import rotation_matrices, rotation_vectors
+from worker.calibration.problem import Problem
 from worker.calibration.records import Options, ProgressReporter
 from worker.calibration.refinement.refine import Observations, refine
-from worker.calibration.solve import Problem, refine_poses
+from worker.calibration.steps import refine_poses
 
 pytestmark = pytest.mark.slow
 

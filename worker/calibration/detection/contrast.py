@@ -1,4 +1,5 @@
-"""In which colour channel a marking stands out from its ground, and whether it is the brighter or the darker one there.
+"""Contrast of markings: the colour channel in which each stands out from its ground, and whether it is brighter or
+darker there.
 
 Green is looked at first: lenses put blue and red elsewhere, up to some pixels towards the edges of the picture (the
 violet side of white lines), and the intrinsics are those of green. But blue paint on wood and orange paint on turf can
@@ -21,9 +22,10 @@ from worker.calibration.geometry.camera import Frame
 
 BLUE, GREEN, RED, LUMA = range(4)
 LUMA_SHARES = (0.0722, 0.7152, 0.2126)
-"""Of blue, green and red in luma, the brightness that video carries for each pixel (BT.709): mostly green."""
+"""Shares of blue, green and red in luma, the brightness that video carries for each pixel (BT.709): mostly green."""
 CONTRASTS = tuple((channel, sign) for channel in (GREEN, RED, BLUE) for sign in (1, -1))
-"""A marking is brighter (1) or darker (-1) than its ground in a channel; the first that its paint allows is usual."""
+"""Pairs of a channel and a sign: a marking is brighter (1) or darker (-1) than its ground there. The first pair that
+its paint allows is the usual one."""
 PAINT = {
     "yellow": (0.1, 0.8, 0.9),
     "black": (0.1, 0.1, 0.1),
@@ -32,25 +34,19 @@ PAINT = {
     "green": (0.2, 0.6, 0.1),
     "orange": (0.1, 0.5, 0.9),
 }
-"""How much (blue, green, red) paint of a name reflects, 0..1."""
-DEEP = 0.25
-"""What reflects less in a channel is hardly ever brighter than its ground there; on ice anything can be darker."""
-CLEARLY = 0.2
-"""By so much correlation another contrast has to be better than bright in green."""
-OPPOSES = 0.33
-"""What stands out so much, beside how it stands out where it does most, as its paint cannot is of another paint."""
+"""Reflectance (blue, green, red) of paint by its name, 0..1."""
 
 
 class PixelReader(Protocol):
-    """A picture that is read between its pixels, at the places that are asked for."""
+    """Picture that is read between its pixels, at given places only."""
 
     def read(self, channel: int, column: NDArray[np.float32], row: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Brightness (P, N) 0..255 in one channel, or `LUMA`, at columns and rows (P, N); NaN outside the picture."""
+        """Return the brightness (P, N) 0..255 in a channel, or `LUMA`, at columns and rows (P, N); NaN outside."""
         ...
 
 
 class Channels:
-    """The colour channels of the frames of one camera: of several frames their median, without what walks by.
+    """Colour channels of the frames of one camera: for several frames their median, without what walks by.
 
     `swayed`: how each of several lies beside that still view.
     """
@@ -61,31 +57,32 @@ class Channels:
         self._read: dict[int, NDArray[np.float32]] = {}
 
     def __getitem__(self, channel: int) -> NDArray[np.float32]:
-        """Brightness (H, W) 0..255 in one channel, read when it is first asked for."""
+        """Return the brightness (H, W) 0..255 in one channel, computed once."""
         if channel not in self._read:
             self._read[channel] = median([_plane(frame, channel) for frame in self._frames], self._swayed)
         return self._read[channel]
 
     def read(self, channel: int, column: NDArray[np.float32], row: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Brightness (P, N) between the pixels, see `PixelReader`."""
+        """Return the brightness (P, N) between the pixels, see `PixelReader`."""
         return read_planes(self[channel], column, row, outside=np.nan)
 
 
 def _plane(frame: Frame, channel: int) -> NDArray[np.uint8]:
-    """One channel (H, W) of a frame, its pixels beside each other."""
+    """Return one channel (H, W) of a frame, its pixels beside each other."""
     if channel == LUMA:
         return np.asarray(cv2.transform(frame, np.array([LUMA_SHARES])), dtype=np.uint8)
     return np.asarray(cv2.extractChannel(frame, channel), dtype=np.uint8)
 
 
 def possible_signs(colour: str, channel: int) -> tuple[int, ...]:
-    """Whether paint of a colour may be brighter (1) or darker (-1) than its ground in a channel; white says nothing.
+    """Return the signs that paint of a colour can have in a channel: brighter (1) or darker (-1) than its ground.
 
-    White is what a marking is called unless somebody has said otherwise.
+    White allows both: it is what a marking is called unless somebody has said otherwise.
     """
     if colour == WHITE:
         return (1, -1)
-    return (-1,) if _reflectance(colour)[channel] < DEEP else (1, -1)
+    # Reflectance below which paint is hardly ever brighter than its ground in a channel; on ice anything can be darker.
+    return (-1,) if _reflectance(colour)[channel] < 0.25 else (1, -1)
 
 
 def _reflectance(colour: str) -> tuple[float, float, float]:

@@ -1,4 +1,4 @@
-"""What of a frame does not count: areas that are ignored, and lines that are painted and not the venue's."""
+"""Exclusions from a frame: ignored areas, and painted lines that are not the venue's."""
 
 from __future__ import annotations
 
@@ -11,12 +11,9 @@ from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.ignored_areas import Ignored
 from worker.calibration.geometry.visibility import VisibleLines
 
-BESIDE_PX = 6.0
-"""How far from where the pose puts them other lines do not count, in pixels of a 4K frame; 2 px at least."""
-
 
 def left_out(pitch: Field, camera: Camera) -> NDArray[np.bool_] | None:
-    """Where (H, W) the frame of a camera does not count, by its pose; None where all of it does.
+    """Return the mask (H, W) of pixels of a camera's frame that do not count, by its pose; None if all count.
 
     Where a line of the venue and another one meet, or are the same, the frame counts.
     """
@@ -24,7 +21,8 @@ def left_out(pitch: Field, camera: Camera) -> NDArray[np.bool_] | None:
     others = pitch.other_points()
     if others is None:
         return ignored
-    tolerance = max(BESIDE_PX * camera.intrinsics.relative_size, 2.0)
+    # Half width of the excluded band around other lines, in pixels of a 4K frame; 2 px at least.
+    tolerance = max(6.0 * camera.intrinsics.relative_size, 2.0)
     other, own = (
         line_band(VisibleLines.from_camera(lines, camera), camera.intrinsics.size, tolerance) > 0
         for lines in (others, pitch.line_points())
@@ -34,12 +32,12 @@ def left_out(pitch: Field, camera: Camera) -> NDArray[np.bool_] | None:
 
 
 def of_use(ignored: Ignored | None, response: NDArray[np.float32]) -> NDArray[np.float32]:
-    """A response (H, W) to the frame of a camera, 0 where the frame is ignored."""
+    """Return a response (H, W) to the frame of a camera with 0 where the frame is ignored."""
     return response if ignored is None else np.where(ignored.area, np.float32(0), response)
 
 
 def line_band(seen: VisibleLines, size: tuple[int, int], tolerance: float) -> NDArray[np.uint8]:
-    """1 where a pixel (H, W) is on a line or within `tolerance` of one."""
+    """Return 1 for pixels (H, W) on a line or within `tolerance` of one, 0 elsewhere."""
     band = np.zeros((size[1], size[0]), dtype=np.uint8)
     along = np.stack([seen.normal[:, 1], -seen.normal[:, 0]], axis=1) * seen.length_px[:, None] * 0.6
     thickness = np.rint(seen.width_px + 2 * tolerance).astype(int)

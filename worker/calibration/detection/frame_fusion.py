@@ -15,36 +15,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from worker.calibration.geometry.camera import Array, Camera, Frame, Pose
-from worker.calibration.geometry.derivatives import pixel_slopes
+from worker.calibration.geometry.derivatives import pixel_jacobian
 from worker.calibration.geometry.lens import Lens
 from worker.calibration.geometry.rotation import rotation_matrices
 
 Grey = NDArray[np.uint8]
 
-CORNERS, CORNER_QUALITY, CORNERS_APART_PX = 800, 0.005, 12
 FEWEST_FOLLOWED = 30
-"""Corners to be found again in a frame; with fewer it is taken for still."""
-BACK_AGAIN_PX = 0.3
-"""Followed to the other frame and back again, a corner that stands still comes back to where it was."""
-STANDING_STILL_PX = 1.0
-"""How far beside a common motion a corner may be and still stand still."""
-OUTLIER = 3.0
-"""Corners farther off than this many standard deviations are not counted."""
-LEAST_SWAY_PX = 0.05
-"""A frame that lies nearer than this is left as it is."""
+"""Fewest corners to be found again in a frame; with fewer it is taken for still."""
 GRID_PX = 32
-BAND_ROWS = 128
 
 
 @dataclass(frozen=True)
 class Sway:
-    """Where a frame shows what a still view shows: `shift` (h, w, 2) px at every `GRID_PX`-th pixel, None for none."""
+    """Displacement of a frame against the still view: `shift` (h, w, 2) px at every `GRID_PX`-th pixel, or None."""
 
     shift: NDArray[np.float32] | None
 
     @classmethod
     def from_turn(cls, turn: Array, lens: Lens) -> Sway:
-        """That of a camera that has turned by a rotation vector (3,) in its own frame, rad."""
+        """Return the displacement for a camera that turned by a rotation vector (3,) in its own frame, rad."""
         width, height = lens.size
         grid = np.stack(
             np.meshgrid(np.arange(0, width + GRID_PX, GRID_PX), np.arange(0, height + GRID_PX, GRID_PX)), -1
@@ -52,10 +42,11 @@ class Sway:
         camera = _at_origin(lens)
         shift = camera.project(camera.rays(grid.astype(float)) @ rotation_matrices(turn).T) - grid
         shift = np.nan_to_num(shift, nan=0.0, posinf=0.0, neginf=0.0)
-        return cls(shift.astype(np.float32) if np.abs(shift).max() > LEAST_SWAY_PX else None)
+        # Shift below which a frame is left as it is.
+        return cls(shift.astype(np.float32) if np.abs(shift).max() > 0.05 else None)
 
     def rows(self, picture: NDArray[np.uint8], top: int, bottom: int) -> NDArray[np.uint8]:
-        """Rows of the still view (bottom - top, W) out of the frame's `picture` (H, W)."""
+        """Return rows of the still view (bottom - top, W), resampled from the frame's `picture` (H, W)."""
         if self.shift is None:
             return picture[top:bottom]
         columns = np.arange(picture.shape[1], dtype=np.float32)
@@ -68,11 +59,11 @@ class Sway:
 
 
 def sways(frames: Sequence[Frame], lens: Lens) -> list[Sway]:
-    """How each of several frames lies beside where the camera was on average. Deterministic."""
+    """Return the displacement of each of several frames against the camera's mean position. Deterministic."""
     if len(frames) == 1:
         return [Sway(None)]
     first = _grey(frames[0])
-    corners = cv2.goodFeaturesToTrack(first, CORNERS, CORNER_QUALITY, CORNERS_APART_PX)
+    corners = cv2.goodFeaturesToTrack(first, 800, 0.005, 12)
     turns = np.zeros((len(frames), 3))
     if corners is not None:
         there = np.asarray(corners, dtype=np.float32)
@@ -81,13 +72,14 @@ def sways(frames: Sequence[Frame], lens: Lens) -> list[Sway]:
 
 
 def median(pictures: Sequence[NDArray[np.uint8]], swayed: Sequence[Sway]) -> NDArray[np.float32]:
-    """The median (H, W) of pictures of one camera as its still view shows them; in bands, to bound the memory."""
+    """Return the median (H, W) of pictures of one camera in its still view; computed in bands, to bound the memory."""
     if len(pictures) == 1:
         return pictures[0].astype(np.float32)
     planes = [np.ascontiguousarray(picture) for picture in pictures]
     still = np.empty(planes[0].shape, dtype=np.float32)
-    for top in range(0, len(still), BAND_ROWS):
-        bottom = min(top + BAND_ROWS, len(still))
+    band_rows = 128
+    for top in range(0, len(still), band_rows):
+        bottom = min(top + band_rows, len(still))
         still[top:bottom] = np.median(
             [sway.rows(plane, top, bottom) for plane, sway in zip(planes, swayed, strict=True)], axis=0
         )
@@ -99,34 +91,36 @@ def _grey(frame: Frame) -> Grey:
 
 
 def _turn(first: Grey, later: Grey, corners: NDArray[np.floating], lens: Lens) -> Array:
-    """By what rotation vector (3,) rad the camera has turned between two frames; zeros where nothing tells."""
+    """Return the rotation vector (3,) rad of the camera between two frames; zeros where too few corners tell."""
     before, after = _standing_still(first, later, corners)
     if len(before) < FEWEST_FOLLOWED:
         return np.zeros(3)
     camera = _at_origin(lens)
-    slopes = pixel_slopes(camera, camera.rays(before))[..., :3]
-    counted = np.isfinite(slopes).all(axis=(1, 2))
+    jacobian = pixel_jacobian(camera, camera.rays(before))[..., :3]
+    counted = np.isfinite(jacobian).all(axis=(1, 2))
     for _ in range(2):
-        turn = np.linalg.lstsq(slopes[counted].reshape(-1, 3), (after - before)[counted].ravel(), rcond=None)[0]
-        off = np.linalg.norm(after - before - slopes @ turn, axis=1)
-        counted &= off <= OUTLIER * np.sqrt(np.mean(off[counted] ** 2))
+        turn = np.linalg.lstsq(jacobian[counted].reshape(-1, 3), (after - before)[counted].ravel(), rcond=None)[0]
+        off = np.linalg.norm(after - before - jacobian @ turn, axis=1)
+        counted &= off <= 3.0 * np.sqrt(np.mean(off[counted] ** 2))
     return np.asarray(turn, dtype=float)
 
 
 def _standing_still(first: Grey, later: Grey, corners: NDArray[np.floating]) -> tuple[Array, Array]:
-    """Where what stands still is in two frames, (N, 2) px each: what walks moves unlike the rest."""
+    """Return pixels (N, 2) of corners that stand still in two frames: what walks moves unlike the rest."""
     there, found, _ = cv2.calcOpticalFlowPyrLK(first, later, corners, np.empty_like(corners))
     back, found_again, _ = cv2.calcOpticalFlowPyrLK(later, first, there, np.empty_like(corners))
     followed = (np.asarray(found, dtype=bool) & np.asarray(found_again, dtype=bool)).ravel()
-    followed &= np.linalg.norm(back - corners, axis=-1).ravel() < BACK_AGAIN_PX
+    # Largest distance between a corner and where it is found when it is followed to the other frame and back again.
+    followed &= np.linalg.norm(back - corners, axis=-1).ravel() < 0.3
     before, after = corners[followed].reshape(-1, 2), there[followed].reshape(-1, 2)
     if len(before) >= FEWEST_FOLLOWED:
-        _, still = cv2.estimateAffinePartial2D(before, after, ransacReprojThreshold=STANDING_STILL_PX)
+        # Largest distance of a corner from a common motion for it to stand still.
+        _, still = cv2.estimateAffinePartial2D(before, after, ransacReprojThreshold=1.0)
         together = np.zeros(len(before), dtype=bool) if still is None else still.ravel() > 0
         before, after = before[together], after[together]
     return before.astype(float), after.astype(float)
 
 
 def _at_origin(lens: Lens) -> Camera:
-    """A camera that looks along its own axes: its rays are directions in its own frame."""
+    """Return a camera that looks along its own axes: its rays are directions in its own frame."""
     return Camera("still", lens, Pose(np.zeros(3), np.zeros(3)))

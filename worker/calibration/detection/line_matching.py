@@ -1,4 +1,4 @@
-"""How well a frame fits the expected lines at every shift across them: correlation with the profile of a painted line.
+"""Matched filter for expected lines: correlation of a frame with the profile of a painted line, at shifts across it.
 
 The profile is the one that a line of the expected width should have after the blur of lens and sensor, bright or dark,
 in the channel in which the marking stands out.
@@ -15,11 +15,9 @@ from numpy.typing import NDArray
 from fields.shapes import WHITE
 from worker.calibration.detection.contrast import (
     BLUE,
-    CLEARLY,
     CONTRASTS,
     GREEN,
     LUMA,
-    OPPOSES,
     RED,
     Channels,
     PixelReader,
@@ -30,33 +28,29 @@ from worker.calibration.geometry.camera import Array
 from worker.calibration.geometry.visibility import VisibleLines
 
 LENS_BLUR_PX = 0.9
-"""Standard deviation of lens, sensor and compression together: it softens the edges of the expected profile."""
+"""Standard deviation of the blur of lens, sensor and compression together, which softens the edges of the expected
+profile."""
 ALONG_PX = (-3.0, -1.5, 0.0, 1.5, 3.0)
-"""Parallel profiles averaged for one measurement: the noise of grass falls, and a line hardly bends over 6 px."""
+"""Places of the parallel profiles that are averaged for one measurement: the noise of grass falls, and a line hardly
+bends over 6 px."""
 WIDTH_CLASSES_PX = ((0.3, 3.0, 0.5), (3.0, 10.0, 0.5), (10.0, 30.0, 1.0), (30.0, 90.0, 2.0))
-"""Lines from..to px wide share a filter length and a sampling step."""
+"""Classes of line widths (from, to, sampling step): lines of one class share a filter length and a step."""
 BESIDE_PX = 4.0
-"""How much of the grass on each side belongs to the filter, beyond a third of the line's width."""
-GRID_PX = 16.0
-"""Between the points of the picture from which places to sample are counted."""
-TOGETHER_PX = 40.0
-"""Length of line, in pixels of a 4K frame, over which a ridge has to go on to be one."""
-LUMA_WEAKER = 0.05
-"""By so much less mean correlation a marking may stand out in luma than in green and be read there."""
+"""Width of grass on each side that belongs to the filter, beyond a third of the line's width."""
 LEAST_ALONG = 0.5
-"""Mean correlation with the expected profile, over that length, from which a ridge is a line for itself."""
+"""Mean correlation with the expected profile, over 40 px of a 4K frame, from which a ridge is a line by itself."""
 
 
 @dataclass(frozen=True)
 class Matches:
-    """Pieces of line of about one width, and how well they fit at shifts across themselves.
+    """Matched-filter responses of pieces of line of about one width, at shifts across themselves.
 
     `which` (M,): of the lines that were looked for; `brightness` (M, S + K - 1): profiles across them, NaN outside the
     picture, in steps of `sampling_px`; `expected` (M, K) at `offsets` (K,) from their centres, see `expected_profiles`;
     `correlation` (M, S) of the two at `shifts` (S,) px along their normals, -1..1, positive where a piece is bright or
     dark as its marking is; `base` (M,) px: where the shifts of each begin, within a step of where it is expected;
     `along` (M, S): the mean correlation of the pieces of the same marking around each: high where a ridge goes on along
-    the line, near zero elsewhere; `opposed` (M, S): whether what is there has another paint's colour.
+    the line, near zero elsewhere; `opposed` (M, S): True where another paint's colour is seen.
     """
 
     which: NDArray[np.intp]
@@ -70,12 +64,12 @@ class Matches:
     base: Array
     sampling_px: float
 
-    def signed(self, sign: int) -> Matches:
-        """As lines that are brighter (1) or darker (-1) than their ground; nothing is known of other paint."""
+    def with_polarity(self, sign: int) -> Matches:
+        """Return the matches for lines brighter (1) or darker (-1) than their ground; ignores other paint."""
         return self if sign == 1 else replace(self, correlation=-self.correlation, along=-self.along)
 
     def where(self, chosen: NDArray[np.bool_], sign: int) -> Matches:
-        """Those of some pieces, as lines that are brighter (1) or darker (-1) than their ground."""
+        """Return the matches of some pieces, for lines that are brighter (1) or darker (-1) than their ground."""
         return replace(
             self,
             which=self.which[chosen],
@@ -89,18 +83,18 @@ class Matches:
 
     @property
     def contrast(self) -> Array:
-        """How much (M, S) the pieces stand out as lines at each shift: grey levels, but for the filter's norm."""
+        """Contrast (M, S) of the pieces as lines at each shift: grey levels, but for the filter's norm."""
         windows = np.lib.stride_tricks.sliding_window_view(self.brightness, self.expected.shape[1], axis=1)
         return np.asarray(np.einsum("nsk,nk->ns", windows, self.expected))
 
 
 def match_lines(seen: VisibleLines, channels: Channels, reach_px: float, relative_size: float) -> list[Matches]:
-    """The matches of all lines that are wide enough to be seen, for shifts up to `reach_px`, by class of width.
+    """Return the matches of all lines that are wide enough to be seen, for shifts up to `reach_px`, by class of width.
 
     Each marking is looked for where it stands out most: in another channel than green only if green does not show it.
     What has another colour than a marking that is known not to be white is no match.
     """
-    looked, strength = _looked_for(seen, channels, reach_px, relative_size)
+    looked, strength = _match_channels(seen, channels, reach_px, relative_size)
     chosen = _strongest(strength)[seen.points.marking]
     return [
         of_class.where(chosen[of_class.which] == number, sign)
@@ -111,18 +105,19 @@ def match_lines(seen: VisibleLines, channels: Channels, reach_px: float, relativ
 
 
 def known_contrasts(seen: VisibleLines, channels: Channels, reach_px: float, relative_size: float) -> NDArray[np.intp]:
-    """Where each marking stands out in one picture, (K, 2): the channel, and 1 for brighter or -1 for darker there.
+    """Return the contrast of each marking in one picture, (K, 2): the channel, and 1 for brighter or -1 for darker.
 
-    That is luma in place of green for all that luma shows as well.
+    Luma replaces green for all markings that luma shows as well.
     """
-    _, strength = _looked_for(seen, channels, reach_px, relative_size)
+    _, strength = _match_channels(seen, channels, reach_px, relative_size)
     chosen = _strongest(strength)
     everywhere = np.ones(len(seen), dtype=bool)
     in_luma = {GREEN: _matches_in(channels, LUMA, seen, _bend(seen), everywhere, reach_px, relative_size)}
     by_luma = _strengths(in_luma, seen)
     contrasts = np.array(CONTRASTS)[chosen]
     of_marking = np.arange(len(chosen))
-    as_well = by_luma[chosen, of_marking] >= strength[chosen, of_marking] - LUMA_WEAKER
+    # Mean correlation by which a marking may stand out less in luma than in green and still be read in luma.
+    as_well = by_luma[chosen, of_marking] >= strength[chosen, of_marking] - 0.05
     contrasts[as_well & (contrasts[:, 0] == GREEN), 0] = LUMA
     return contrasts
 
@@ -130,7 +125,7 @@ def known_contrasts(seen: VisibleLines, channels: Channels, reach_px: float, rel
 def match_known(
     seen: VisibleLines, picture: PixelReader, contrasts: NDArray[np.intp], reach_px: float, relative_size: float
 ) -> list[Matches]:
-    """The matches of lines whose markings have known `contrasts` (K, 2) (see `known_contrasts`), by class of width."""
+    """Return the matches of lines by known `contrasts` (K, 2) of the markings (see `known_contrasts`), by width."""
     bend, of_lines = _bend(seen), contrasts[seen.points.marking]
     matches = []
     for channel, sign in np.unique(of_lines, axis=0).tolist():
@@ -138,38 +133,40 @@ def match_known(
             if which.any():
                 rows = np.flatnonzero(which)
                 found = _matches_of(of_class, rows, picture, channel, seen, bend, reach_px, relative_size)
-                matches.append(found.signed(sign))
+                matches.append(found.with_polarity(sign))
     return matches
 
 
-def _looked_for(
+def _match_channels(
     seen: VisibleLines, channels: Channels, reach_px: float, relative_size: float
 ) -> tuple[dict[int, list[Matches]], Array]:
-    """The matches by channel, in other channels than green where they are wanted, and the strengths (see `_strengths`).
+    """Return the matches by channel, and the strengths of markings in them (see `_strengths`).
 
-    Wanted they are for markings that green does not show, and for those that are known not to be white.
+    Other channels than green are read for markings that green does not show, and for those that are known not to be
+    white.
     """
     everywhere, bend = np.ones(len(seen), dtype=bool), _bend(seen)
     looked = {GREEN: _matches_in(channels, GREEN, seen, bend, everywhere, reach_px, relative_size)}
     strength = _strengths(looked, seen)
-    wanted = (strength.max(axis=0) < LEAST_ALONG)[seen.points.marking] | (seen.points.colour != WHITE)
-    if wanted.any():
-        looked |= {c: _matches_in(channels, c, seen, bend, wanted, reach_px, relative_size) for c in (RED, BLUE)}
+    chosen = (strength.max(axis=0) < LEAST_ALONG)[seen.points.marking] | (seen.points.colour != WHITE)
+    if chosen.any():
+        looked |= {c: _matches_in(channels, c, seen, bend, chosen, reach_px, relative_size) for c in (RED, BLUE)}
         looked = _without_other_paint(looked, seen.points.colour)
         strength = _strengths(looked, seen)
     return looked, strength
 
 
 def _strongest(strength: Array) -> NDArray[np.intp]:
-    """Which of `CONTRASTS` each marking (K,) has: the usual one unless another one is clearly stronger."""
+    """Return the index into `CONTRASTS` of each marking (K,): the usual one unless another one is clearly stronger."""
     favoured = strength.copy()
     usual = np.argmax(strength > -np.inf, axis=0)
-    favoured[usual, np.arange(strength.shape[1])] += CLEARLY
+    # Another contrast has to correlate better by so much.
+    favoured[usual, np.arange(strength.shape[1])] += 0.2
     return np.asarray(np.argmax(favoured, axis=0))
 
 
 def _without_other_paint(looked: Mapping[int, list[Matches]], colour: NDArray[np.str_]) -> dict[int, list[Matches]]:
-    """The matches in three channels with what has another colour than the paint (N,) of the lines opposed."""
+    """Return the matches in three channels, opposed where another colour than the paint (N,) is seen."""
     freed = {channel: list(classes) for channel, classes in looked.items()}
     for number, (green, red, blue) in enumerate(zip(*(looked[c] for c in (GREEN, RED, BLUE)), strict=True)):
         named = colour[red.which] != WHITE
@@ -179,7 +176,8 @@ def _without_other_paint(looked: Mapping[int, list[Matches]], colour: NDArray[np
         opposed = np.zeros(most.shape, dtype=bool)
         for channel, sign in CONTRASTS:
             impossible = np.array([sign not in possible_signs(str(c), channel) for c in colour[red.which[named]]], bool)
-            opposed |= impossible[:, None] & (sign * contrast[channel] >= OPPOSES * most)
+            # A third of the strongest contrast that the paint cannot have shows another paint.
+            opposed |= impossible[:, None] & (sign * contrast[channel] >= 0.33 * most)
         for channel, of_class, rows in ((GREEN, green, everywhere), (RED, red, named), (BLUE, blue, named)):
             there = of_class.opposed.copy()
             there[rows] = opposed
@@ -188,9 +186,9 @@ def _without_other_paint(looked: Mapping[int, list[Matches]], colour: NDArray[np
 
 
 def _strengths(looked: Mapping[int, Sequence[Matches]], seen: VisibleLines) -> Array:
-    """How well markings (K,) match in each of `CONTRASTS`, -1..1: where most of a marking is shifted by as much.
+    """Return the strength of markings (K,) in each of `CONTRASTS`, -1..1, at the shift that suits most of each marking.
 
-    Minus infinity where their paint cannot look so, or where nobody has looked.
+    Minus infinity where their paint cannot look so, or where the channel was not read.
     """
     marking, colour = seen.points.marking, seen.points.colour
     count = int(marking.max(initial=-1)) + 1
@@ -213,23 +211,23 @@ def _matches_in(
     channel: int,
     seen: VisibleLines,
     bend: Array,
-    wanted: NDArray[np.bool_],
+    chosen: NDArray[np.bool_],
     reach_px: float,
     relative_size: float,
 ) -> list[Matches]:
-    """The matches of the `wanted` lines (N,), which `bend` (N,) so, in one channel, by class of width."""
+    """Return the matches of the `chosen` lines (N,), of curvature `bend` (N,), in one channel, by class of width."""
     return [
         _matches_of(of_class, np.flatnonzero(which), picture, channel, seen, bend, reach_px, relative_size)
-        for of_class, which in _by_width(seen, wanted)
+        for of_class, which in _by_width(seen, chosen)
     ]
 
 
 def _by_width(
-    seen: VisibleLines, wanted: NDArray[np.bool_]
+    seen: VisibleLines, chosen: NDArray[np.bool_]
 ) -> Iterator[tuple[tuple[float, float, float], NDArray[np.bool_]]]:
-    """Each of `WIDTH_CLASSES_PX` and which of the `wanted` lines (N,) have such a width."""
+    """Yield each of `WIDTH_CLASSES_PX` and the mask (N,) of `chosen` lines of such a width."""
     for low, high, sampling in WIDTH_CLASSES_PX:
-        yield (low, high, sampling), wanted & (seen.width_px >= low) & (seen.width_px < high)
+        yield (low, high, sampling), chosen & (seen.width_px >= low) & (seen.width_px < high)
 
 
 def _matches_of(
@@ -242,7 +240,7 @@ def _matches_of(
     reach_px: float,
     relative_size: float,
 ) -> Matches:
-    """The matches of the lines `which` (M,), all of one of `WIDTH_CLASSES_PX`."""
+    """Return the matches of the lines `which` (M,), all of one of `WIDTH_CLASSES_PX`."""
     _, high, sampling = of_class
     pieces = seen[which]
     half_filter = int(np.ceil((high * 0.85 + BESIDE_PX) / sampling))
@@ -254,24 +252,28 @@ def _matches_of(
     offsets = sampling * np.arange(-half_filter, half_filter + 1, dtype=float)
     expected = expected_profiles(pieces.width_px, offsets)
     correlation = sliding_correlation(across, expected)
-    along = _mean_along(correlation, pieces, TOGETHER_PX * relative_size)
+    # Length of line, in pixels of a 4K frame, over which a ridge has to go on to be one.
+    along = _mean_along(correlation, pieces, 40.0 * relative_size)
     shifts = sampling * np.arange(-half_search, half_search + 1, dtype=float)
     free = np.zeros(correlation.shape, dtype=bool)
     return Matches(which, across, expected, offsets, correlation, along, free, shifts, base, sampling)
 
 
 def _beside_grid(pieces: VisibleLines, sampling_px: float) -> Array:
-    """How far (M,) px along its normal the nearest place is where a piece of line is sampled, wherever it is expected.
+    """Return the distance (M,) px along its normal from each piece of line to its nearest sampling place.
 
-    The places stand fast in the picture. Else what is read of a line would depend a little on where it was looked for.
+    Sampling places stand fast in the picture. Else what is read of a line would depend a little on where it was
+    expected.
     """
-    fixed = GRID_PX * np.round(pieces.pixel / GRID_PX)
+    # Spacing of the fixed points of the picture from which sampling places are counted.
+    grid_px = 16.0
+    fixed = grid_px * np.round(pieces.pixel / grid_px)
     beside = np.sum((pieces.pixel - fixed) * pieces.normal, axis=1)
     return np.asarray(sampling_px * np.round(beside / sampling_px) - beside)
 
 
 def _mean_along(correlation: Array, pieces: VisibleLines, length_px: float) -> Array:
-    """Correlations (M, S) averaged along each marking over about `length_px`, as many pieces to each side."""
+    """Return correlations (M, S) averaged along each marking over about `length_px`, as many pieces to each side."""
     half = np.ceil(length_px / 2 / np.maximum(pieces.length_px, 1e-6)).astype(int)
     breaks = (np.diff(pieces.index) != 1) | (np.diff(pieces.points.marking) != 0)
     stretch = np.concatenate([[0], np.cumsum(breaks)])[: len(pieces)]
@@ -284,7 +286,7 @@ def _mean_along(correlation: Array, pieces: VisibleLines, length_px: float) -> A
 
 
 def expected_profiles(width_px: Array, offsets_px: Array) -> Array:
-    """Zero-mean, unit-norm profiles (N, K) of lines `width_px` (N,) wide at `offsets_px` (K,) from their centre.
+    """Return zero-mean, unit-norm profiles (N, K) of lines `width_px` (N,) wide at `offsets_px` (K,) from their centre.
 
     A filter reaches a third of the width (and `BESIDE_PX`) beyond each edge and is zero farther out.
     """
@@ -296,15 +298,15 @@ def expected_profiles(width_px: Array, offsets_px: Array) -> Array:
 
 
 def filter_reach(width_px: Array) -> Array:
-    """How far (N,) from the centre of a line its filter reaches, in px."""
+    """Return the half length (N,) px of the filters of lines `width_px` (N,) wide."""
     return width_px / 2 + width_px / 3 + BESIDE_PX
 
 
 def sliding_correlation(profiles: Array, filters: Array) -> Array:
-    """Normalised correlation (N, S - K + 1) of profiles (N, S) with their filters (N, K) at every shift.
+    """Return the normalised correlation (N, S - K + 1) of profiles (N, S) with filters (N, K) at every shift.
 
     Mean and norm of a window are taken over the filter's support, so that far surroundings do not count. NaN where any
-    of a window is.
+    value of a window is.
     """
     windows = np.lib.stride_tricks.sliding_window_view(profiles, filters.shape[1], axis=1)
     product = np.einsum("nsk,nk->ns", windows, filters)
@@ -316,7 +318,7 @@ def sliding_correlation(profiles: Array, filters: Array) -> Array:
 
 
 def _window_sums(values: Array, first: NDArray[np.intp], count: NDArray[np.intp], shifts: int) -> Array:
-    """Sums (N, `shifts`) of `count` (N,) neighbours in rows (N, S), from `first` (N,) on, shift by shift."""
+    """Return sums (N, `shifts`) of `count` (N,) neighbours in rows (N, S), from `first` (N,) on, shift by shift."""
     up_to = np.zeros((len(values), values.shape[1] + 1))
     np.cumsum(values, axis=1, out=up_to[:, 1:])
     begin = first[:, None] + np.arange(shifts)
@@ -325,7 +327,7 @@ def _window_sums(values: Array, first: NDArray[np.intp], count: NDArray[np.intp]
 
 
 def _profiles(picture: PixelReader, channel: int, seen: VisibleLines, bend: Array, offsets: Array) -> Array:
-    """Brightness (N, S) across the lines at `offsets` (N, S) px, averaged along them; NaN outside the picture.
+    """Read the brightness (N, S) across the lines at `offsets` (N, S) px, averaged along them; NaN outside the picture.
 
     `bend` (N,): 1 / radius of the lines in the picture, in 1 / px, positive where they turn towards their normals.
     """
@@ -342,7 +344,7 @@ def _profiles(picture: PixelReader, channel: int, seen: VisibleLines, bend: Arra
 
 
 def _bend(seen: VisibleLines) -> Array:
-    """1 / radius (N,) of the lines in the picture (see `_profiles`), from the neighbours on the same marking."""
+    """Return 1 / radius (N,) of the lines in the picture (see `_profiles`), from the neighbours on the same marking."""
     rise, run = np.zeros(len(seen)), np.zeros(len(seen))
     together = (np.diff(seen.index) == 1) & (np.diff(seen.points.marking) == 0)
     step = np.diff(seen.pixel, axis=0)[together]

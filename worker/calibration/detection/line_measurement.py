@@ -1,4 +1,4 @@
-"""Where the painted lines are in a frame: sub-pixel centres, measured across each line with a matched filter.
+"""Measurement of painted lines in a frame: sub-pixel centres, by a matched filter across each line.
 
 That a ridge is a marking is said by one of two witnesses: the segmentation, or the ridge itself, where it goes on along
 the line as noise and things beside the line do not.
@@ -24,8 +24,9 @@ from worker.calibration.detection.line_matching import (
 )
 from worker.calibration.detection.line_profile import blurred_point, blurred_step, without_nan
 from worker.calibration.detection.sampling import bilinear
-from worker.calibration.geometry.camera import Array, Camera, Plane
-from worker.calibration.geometry.derivatives import lens_slopes, pixel_slopes
+from worker.calibration.geometry.arrays import Array, Plane, take_rows
+from worker.calibration.geometry.camera import Camera
+from worker.calibration.geometry.derivatives import lens_jacobian, pixel_jacobian
 from worker.calibration.geometry.field import LinePoints
 from worker.calibration.geometry.visibility import VisibleLines
 
@@ -34,33 +35,18 @@ CORRELATION = (0.55, 0.65)
 
 Every limit is a ramp: with a step, a measurement beside it would come and go as the pose moves by a hair.
 """
-RESPONSE = (0.25, 0.35)
-"""The network's probability of a marking, and ..."""
-ALONG = (LEAST_ALONG - 0.05, LEAST_ALONG + 0.05)
-"""... the mean correlation along the line, likewise: the larger of the two counts."""
-SEARCH_EDGE_PX, PICTURE_EDGE_PX = 1.0, 2.0
-"""Over so many pixels a measurement fades towards the end of the search and the border of the picture."""
-CENTRE_STEPS = 2
-MOST_UPHILL = 8
-"""Sampling steps from the match that is preferred for lying near to where the line is expected to the best match beside
-it: where a line is measured does not depend on where it is expected."""
-RIDGE = 1e-6
-OFF_CENTRE_PENALTY = 0.15
-"""Correlation that a candidate at the end of the search loses against one where the pose expects the line."""
 NOISE_PX = 0.2
-"""Error of one measurement of a perfect line."""
+"""Standard deviation of one measurement of a perfect line."""
 PAINT_M = 0.006
-"""Lines are painted to about a centimetre."""
+"""Standard deviation of a line's place on the ground: lines are painted to about a centimetre."""
 
 SHARED_NOISE = 0.1
 """Part of the variance of `NOISE_PX` that is the same in every frame of a camera that stands still."""
-MISFIT_ALIKE_PX = 10.0
-"""Length of line over which what lens and field have wrong is the same."""
 
 
 @dataclass(frozen=True)
 class Measurements:
-    """Line centres found in one frame, M of them.
+    """M line centres measured in one frame.
 
     `index` (M,): which of the pitch's line points; `points`: those points; `pixel` (M, 2): where the line was found;
     `normal` (M, 2): across it in the picture, towards `points.normal`; `px_per_metre` and `px_per_metre_up` (M,): how
@@ -83,51 +69,40 @@ class Measurements:
         return len(self.index)
 
     def offset(self, camera: Camera, positions: Array) -> Array:
-        """Pixels (M,) along the normals from where `camera` puts points (M, 3) to where the lines were measured."""
+        """Return pixels (M,) along the normals from where `camera` puts points (M, 3) to the measured lines."""
         return np.asarray(np.sum((self.pixel - camera.project(positions)) * self.normal, axis=1))
 
-    def slopes(self, camera: Camera, positions: Array) -> Array:
-        """The derivative (M, 6) of `offset` by the camera's pose, per rad and metre (see `motion`)."""
-        return -np.einsum("mij,mi->mj", pixel_slopes(camera, positions), self.normal)
+    def jacobian(self, camera: Camera, positions: Array) -> Array:
+        """Jacobian (M, 6) of `offset` by the camera's pose, per rad and metre (see `derivatives`)."""
+        return -np.einsum("mij,mi->mj", pixel_jacobian(camera, positions), self.normal)
 
-    def lens_slopes(self, camera: Camera, positions: Array) -> Array:
-        """The derivative (M, 6) of `offset` by `LENS_NUMBERS` of the camera's lens, px per unit of each."""
-        return -np.einsum("mij,mi->mj", lens_slopes(camera, positions), self.normal)
+    def lens_jacobian(self, camera: Camera, positions: Array) -> Array:
+        """Jacobian (M, 6) of `offset` by `LENS_PARAMETERS` of the camera's lens, px per unit of each."""
+        return -np.einsum("mij,mi->mj", lens_jacobian(camera, positions), self.normal)
 
     @property
     def sigma_px(self) -> Array:
-        """Expected error (M,) along the normal: of the measurement, of paint and ground, and what nothing explains."""
+        """Standard deviation (M,) along the normal: of the measurement, of paint and ground, and of the misfit."""
         of_model = np.hypot(PAINT_M * self.px_per_metre, self.points.uneven_m * self.px_per_metre_up)
         return np.hypot(self.noise_px, of_model)
 
     @property
     def noise_px(self) -> Array:
-        """Expected error (M,) of a measurement when paint and ground are where the model has them.
+        """Standard deviation (M,) of a measurement when paint and ground are where the model has them.
 
-        What nothing explains is alike over `MISFIT_ALIKE_PX`: so much of a line counts as one measurement of it.
-        The mean of many jobs keeps the part of the noise that all of them share.
+        The misfit is alike over 10 px: so much of a line counts as one measurement of it. The mean of many
+        jobs keeps the part of the noise that all of them share.
         """
         noise = NOISE_PX * np.sqrt(SHARED_NOISE + (1 - SHARED_NOISE) / np.asarray(self.jobs))
         return np.hypot(noise, self.misfit_px * np.sqrt(self.alike))
 
     @property
     def alike(self) -> Array:
-        """How many (M,) neighbours share what nothing explains, 1 at least."""
-        return np.maximum(MISFIT_ALIKE_PX / self.length_px, 1.0)
+        """Number (M,) of neighbours that share the same misfit, 1 at least."""
+        return np.maximum(10.0 / self.length_px, 1.0)
 
     def __getitem__(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> Measurements:
-        return Measurements(
-            self.index[chosen],
-            self.points[chosen],
-            self.pixel[chosen],
-            self.normal[chosen],
-            self.px_per_metre[chosen],
-            self.px_per_metre_up[chosen],
-            self.length_px[chosen],
-            self.trust[chosen],
-            self.misfit_px,
-            self.jobs if isinstance(self.jobs, float) else self.jobs[chosen],
-        )
+        return take_rows(self, chosen)
 
 
 class LineProfiles:
@@ -149,7 +124,7 @@ class LineProfiles:
     def read(
         cls, lines: LinePoints, camera: Camera, channels: Channels, response: NDArray[np.float32], reach_px: float
     ) -> Self:
-        """Read it up to `reach_px` to each side of where `camera` expects the `lines`.
+        """Read profiles up to `reach_px` to each side of where `camera` expects the `lines`.
 
         `channels` of the frame; `response` (H, W) the segmentation in 0..1.
         """
@@ -168,11 +143,11 @@ class LineProfiles:
 
     @property
     def any(self) -> bool:
-        """Whether any line was read."""
+        """True if any line was read."""
         return bool(self._classes)
 
     def measure(self, camera: Camera, lines: LinePoints, search_px: float) -> Measurements:
-        """The lines within `search_px` of where `camera` expects them: `lines` are those that were read.
+        """Measure the lines within `search_px` of where `camera` expects them: `lines` are those that were read.
 
         What either the network or the ridge along a line calls a marking is measured.
         """
@@ -193,21 +168,22 @@ class LineProfiles:
         return measured if camera.ignored is None else measured[camera.sees(measured.pixel)]
 
     def cover(self, camera: Camera, lines: LinePoints, search_px: float) -> bool:
-        """Whether all that was read reaches `search_px` beyond where `camera` expects the lines."""
+        """True if all that was read reaches `search_px` beyond where `camera` expects the lines."""
         farthest = np.nanmax(np.abs(self._expected(camera, lines)), initial=0.0)
         return bool(farthest + search_px <= self._reach_px)
 
     def _expected(self, camera: Camera, lines: LinePoints) -> Array:
-        """Pixels (N,) along their normals by which `camera` expects the lines beside where they were read."""
+        """Return pixels (N,) along their normals from where the lines were read to where `camera` expects them."""
         moved = camera.project(lines.position[self._seen.index]) - self._seen.pixel
         return np.asarray(np.sum(moved * self._seen.normal, axis=1))
 
     def _found(self, centred: _Centred, expected: Array, search_px: float) -> tuple[NDArray[np.intp], Array, Array]:
-        """Of one class: which lines were found, how far (px) from where they were read, and how far to trust that."""
+        """Return which lines of one class were found, how far (px) from where they were read, and their trust 0..1."""
         matches = centred.matches
         shifts = matches.base[:, None] + matches.shifts
         beside = np.abs(shifts - expected[:, None])
-        preference = matches.correlation - OFF_CENTRE_PENALTY * (beside / search_px) ** 2
+        # A candidate at the end of the search loses so much correlation against one where the pose expects the line.
+        preference = matches.correlation - 0.15 * (beside / search_px) ** 2
         preference[~(beside <= search_px + matches.sampling_px)] = -np.inf
         best = _peaks(matches.correlation, np.argmax(preference, axis=1))
         every = np.arange(len(best))
@@ -216,20 +192,22 @@ class LineProfiles:
         best, seen = best[row], self._seen[matches.which[row]]
         shift = shifts[row, best] + centred.at(row, best)
         pixel = seen.pixel + shift[:, None] * seen.normal
-        marking = _ramp(matches.along[row, best], *ALONG)
+        marking = _ramp(matches.along[row, best], LEAST_ALONG - 0.05, LEAST_ALONG + 0.05)
         if self._response is not None:
-            marking = np.maximum(marking, _ramp(bilinear(self._response, pixel), *RESPONSE))
+            # Network probability of a marking from which a measurement counts at all, and in full.
+            marking = np.maximum(marking, _ramp(bilinear(self._response, pixel), 0.25, 0.35))
+        # It fades towards the end of the search, and towards the border of the picture.
         trust = (
             marking
             * _ramp(matches.correlation[row, best], *CORRELATION)
-            * _ramp(search_px - np.abs(shift - expected[row]), 0.0, SEARCH_EDGE_PX)
-            * _ramp(self._to_border(seen, shift, matches), 0.0, PICTURE_EDGE_PX)
+            * _ramp(search_px - np.abs(shift - expected[row]), 0.0, 1.0)
+            * _ramp(self._to_border(seen, shift, matches), 0.0, 2.0)
         )
         good = trust > 0
         return matches.which[row[good]], shift[good], trust[good]
 
     def _to_border(self, seen: VisibleLines, shift: Array, matches: Matches) -> Array:
-        """Pixels (N,) from what was read of each line to the border of the picture, negative beyond it."""
+        """Return pixels (N,) from what was read of each line to the border of the picture, negative beyond it."""
         width, height = self._camera.intrinsics.size
         outward = (np.abs(shift) + matches.offsets[-1])[:, None] * np.abs(seen.normal)
         to_last = np.array([width - 1, height - 1]) - (seen.pixel + outward)
@@ -243,12 +221,12 @@ def measure_lines(
     response: NDArray[np.float32],
     search_px: float,
 ) -> Measurements:
-    """The lines of `camera` found within `search_px` of where its pose expects them (see `LineProfiles`)."""
+    """Measure the lines within `search_px` of where the pose of `camera` expects them (see `LineProfiles`)."""
     return LineProfiles.read(lines, camera, channels, response, search_px).measure(camera, lines, search_px)
 
 
 class _Centred:
-    """Matches of one class of width, and where in their windows the lines' centres are: computed once for each."""
+    """Matches of one class of width, with the centres of lines in their windows, computed once for each."""
 
     def __init__(self, matches: Matches, width_px: Array) -> None:
         self.matches, self._width_px = matches, width_px
@@ -256,7 +234,7 @@ class _Centred:
         self._centre = np.zeros(len(width_px))
 
     def at(self, row: NDArray[np.intp], window: NDArray[np.intp]) -> Array:
-        """Pixels (M,) from the middles of windows `window` (M,) of rows `row` (M,) to the centres of their lines."""
+        """Return pixels (M,) from the middles of windows (M,) of rows (M,) to the centres of their lines."""
         new = window != self._window[row]
         if new.any():
             there, begins = row[new], window[new]
@@ -271,7 +249,9 @@ def _peaks(values: Array, begun: NDArray[np.intp]) -> NDArray[np.intp]:
     """Return the columns (N,) of the local maxima in rows of values (N, S) that lie uphill of columns `begun` (N,)."""
     rows, last, height = np.arange(len(values)), values.shape[1] - 1, without_nan(values, -np.inf)
     here = begun
-    for _ in range(MOST_UPHILL):
+    # Most sampling steps from the match that is preferred for lying near to where the line is expected to the best
+    # match beside it: where a line is measured does not depend on where it is expected.
+    for _ in range(8):
         around = np.clip(here + np.array([[0], [-1], [1]]), 0, last)
         higher = np.argmax(height[rows, around], axis=0)
         if not higher.any():
@@ -281,27 +261,27 @@ def _peaks(values: Array, begun: NDArray[np.intp]) -> NDArray[np.intp]:
 
 
 def _ramp(value: Plane, low: float, high: float) -> Array:
-    """0 below `low`, 1 above `high`, straight between them; 0 for NaN."""
+    """Return 0 below `low`, 1 above `high`, straight between them; 0 for NaN."""
     return without_nan(np.clip((np.asarray(value, dtype=float) - low) / (high - low), 0.0, 1.0))
 
 
 def _centre(windows: Array, width_px: Array, offsets: Array, reach_px: float) -> Array:
-    """Centres (N,) of the lines in windows (N, K) of brightness at `offsets` (K,), at most `reach_px` from 0.
+    """Fit the centres (N,) of lines in windows (N, K) of brightness at `offsets` (K,), at most `reach_px` from 0.
 
-    Least squares of what is there: ground, paint, ground. Ground on one side of a line is seldom as bright as on the
-    other, and that must not pull the line.
+    Least squares of ground, paint, ground. Ground on one side of a line is seldom as bright as on the other, and that
+    must not pull the line.
     """
     inside = np.abs(offsets) <= filter_reach(width_px)[:, None]
     windows = without_nan(windows) * inside
     sides = np.array([1.0, -1.0])[:, None, None]
     centre, move = np.zeros(len(windows)), np.zeros((len(windows), len(offsets)))
     model = np.empty((len(windows), 4, len(offsets)))
-    for _ in range(1 + CENTRE_STEPS):
+    for _ in range(3):
         edges = offsets - centre[:, None] + sides * width_px[:, None] / 2
         first, second = blurred_step(edges, LENS_BLUR_PX)
         model[:, 0], model[:, 1], model[:, 2], model[:, 3] = 1 - first, first - second, second, move
         model *= inside[:, None]
-        normal = np.einsum("nak,nbk->nab", model, model) + RIDGE * np.eye(4)
+        normal = np.einsum("nak,nbk->nab", model, model) + 1e-6 * np.eye(4)
         before, paint, behind, by = np.linalg.solve(normal, np.einsum("nak,nk->na", model, windows)[..., None])[
             ..., 0
         ].T

@@ -1,4 +1,4 @@
-"""What a painted line looks like across itself, after a blur."""
+"""Brightness profile across a painted line, after a blur."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _RISE = np.diff(_ERF)
 
 
 def blurred_line(width_px: Array, sigma_px: float, offset_px: Array | float = 0.0) -> Array:
-    """Brightness at `offset_px` from the centre of a line of height 1 and `width_px`, blurred by `sigma_px`.
+    """Return the brightness at `offset_px` from the centre of a line of height 1 and `width_px`, blurred by `sigma_px`.
 
     Arguments broadcast together.
     """
@@ -22,7 +22,7 @@ def blurred_line(width_px: Array, sigma_px: float, offset_px: Array | float = 0.
 
 
 def blurred_step(offset_px: Array, sigma_px: float) -> Array:
-    """Brightness at `offset_px` from a step of height 1, blurred by `sigma_px`."""
+    """Return the brightness at `offset_px` from a step of height 1, blurred by `sigma_px`."""
     # Between the places of the table the error function is off by less than a millionth.
     place = (np.clip(offset_px / (sqrt(2) * sigma_px), -_FARTHEST, _FARTHEST) + _FARTHEST) * _STEPS
     before = place.astype(np.intp)
@@ -30,10 +30,10 @@ def blurred_step(offset_px: Array, sigma_px: float) -> Array:
 
 
 def blurred_point(offset_px: Array, sigma_px: float) -> Array:
-    """The derivative of `blurred_step`, per px."""
+    """Return the derivative of `blurred_step`, per px."""
     return np.asarray(np.exp(-0.5 * (offset_px / sigma_px) ** 2) / (sqrt(2 * pi) * sigma_px))
 
 
 def without_nan(values: Array, instead: float = 0.0) -> Array:
-    """Values (...) with NaN, which stands for places outside the picture, replaced by `instead`."""
+    """Return values (...) with `instead` in place of NaN, which stands for places outside the picture."""
     return np.where(np.isnan(values), instead, values)

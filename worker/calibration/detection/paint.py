@@ -16,27 +16,10 @@ from numpy.typing import NDArray
 from worker.calibration.detection.segmentation import Region
 from worker.calibration.geometry.camera import Array, Frame
 
-LOOKED_AT_WIDTH_PX = 640
-"""Width at which the ground is looked for: lines are thin there."""
-GROUND_PX = 21
-"""Side of the square whose median is the ground, px at that width: more than twice as wide as any line."""
-DARK = 4.0
-"""Added to all brightness, grey levels: what is black anyway has no colour."""
-LEAST_DIFFERENCE = 0.25
-"""The least difference of a line from its ground, as a share of the ground's brightness, whose colour is read off."""
-MOST_COLOURS = 8
-"""Into how many colours all that stands out is sorted. Halls have up to six paints; one that shines, or that another
-line touches, has two."""
-LEAST_PART = 0.03
-"""The least part of all that stands out from the ground which a paint of lines has."""
 SPREAD_RAD = 0.2
 """Spread of the colours of one paint, as an angle between differences: white and yellow on blue are 0.26 apart."""
-FAINTEST = 0.15
-"""The share of a paint below which a pixel shows none: noise, and edges of other lines."""
-GROUND_LEVEL, PAINT_LEVEL = 60.0, 140.0
-"""Grey levels of the ground, and by how much paint is brighter, where only some colours are drawn."""
 ROWS = 256
-"""Rows of a frame that are looked at at once: a frame of 4K would take 400 MB as numbers."""
+"""Rows of a frame that are processed at once: a frame of 4K would take 400 MB as numbers."""
 
 
 def sort_colours(frames: Sequence[Frame], regions: Sequence[Sequence[Region]]) -> Array:
@@ -45,17 +28,21 @@ def sort_colours(frames: Sequence[Frame], regions: Sequence[Sequence[Region]]) -
     They are read off frames (H, W, 3) where `regions` of each can show lines.
     """
     seen = np.concatenate([_colours_of_lines(frame, its) for frame, its in zip(frames, regions, strict=True)])
-    if len(seen) < MOST_COLOURS:
+    # Number of clusters into which the colours that stand out are sorted. Halls have up to six paints; one that shines,
+    # or that another line touches, has two.
+    most_colours = 8
+    if len(seen) < most_colours:
         return np.empty((0, 3))
     hues = seen / np.linalg.norm(seen, axis=1, keepdims=True)
     cv2.setRNGSeed(0)
     criteria = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 50, 1e-4)
-    labels = cv2.kmeans(hues, MOST_COLOURS, np.empty(0), criteria, 3, cv2.KMEANS_PP_CENTERS)[1][:, 0]
+    labels = cv2.kmeans(hues, most_colours, np.empty(0), criteria, 3, cv2.KMEANS_PP_CENTERS)[1][:, 0]
     colours: list[Array] = []
-    for group in sorted((seen[labels == label] for label in range(MOST_COLOURS)), key=len, reverse=True):
+    for group in sorted((seen[labels == label] for label in range(most_colours)), key=len, reverse=True):
         colour = np.median(group, axis=0)
         # Clusters cut a paint in two where it is most of all that is seen.
-        if len(group) >= LEAST_PART * len(seen) and all(_angle(colour, other) > SPREAD_RAD for other in colours):
+        # Clusters of noise are smaller.
+        if len(group) >= 0.03 * len(seen) and all(_angle(colour, other) > SPREAD_RAD for other in colours):
             colours.append(colour)
     return np.array(colours)
 
@@ -64,28 +51,34 @@ def _angle(one: Array, other: Array) -> float:
     return float(np.arccos(np.clip(one @ other / (np.linalg.norm(one) * np.linalg.norm(other)), -1.0, 1.0)))
 
 
-def draw_colours(frame: Frame, colours: Array, chosen: Sequence[int]) -> Frame:
-    """Return the frame (H, W, 3) in grey: the chosen ones of the `colours` (K, 3) of its lines are bright, and all else
-    is as dark as the ground."""
+def draw_colours(frame: Frame, colours: Array, choices: Sequence[Sequence[int]]) -> list[Frame]:
+    """Draw a frame (H, W, 3) in grey, once for each of the `choices` among the `colours` (K, 3) of its lines.
+
+    The chosen ones are bright, and all else is as dark as the ground.
+    """
     sizes = np.linalg.norm(colours, axis=1)
     directions = (colours / sizes[:, None]).T.astype(np.float32)
-    drawn = np.empty_like(frame)
+    drawn = [np.empty_like(frame) for _ in choices]
+    # The share of a paint below which a pixel shows none: noise, and edges of other lines.
+    faintest = 0.15
     for rows, difference in _differences(frame):
         along = difference @ directions
         size = np.linalg.norm(difference, axis=-1, keepdims=True)
         angle = np.arccos(np.clip(along / np.maximum(size, 1e-6), -1.0, 1.0))
         likelihood = np.exp(-0.5 * (angle / SPREAD_RAD) ** 2)
-        # What is of none of the colours is of none of them, and not of the nearest.
+        # A colour unlike all of them belongs to none, and not to the nearest.
         belongs = likelihood / np.maximum(likelihood.sum(axis=-1, keepdims=True), np.exp(-0.5 * 2.0**2))
         share = np.clip(along / sizes.astype(np.float32), 0.0, 1.0)
-        shown = (belongs * share)[..., list(chosen)].sum(axis=-1)
-        shown = np.clip((shown - FAINTEST) / (1 - FAINTEST), 0.0, 1.0)
-        drawn[rows] = (GROUND_LEVEL + PAINT_LEVEL * shown)[..., None]
+        of_each = belongs * share
+        for picture, chosen in zip(drawn, choices, strict=True):
+            shown = np.clip((of_each[..., list(chosen)].sum(axis=-1) - faintest) / (1 - faintest), 0.0, 1.0)
+            # Grey levels of the ground, and by how much paint is brighter.
+            picture[rows] = (60.0 + 140.0 * shown)[..., None]
     return drawn
 
 
 def _colours_of_lines(frame: Frame, regions: Sequence[Region]) -> NDArray[np.float32]:
-    """Differences (N, 3) to the ground of pixels that differ more than their neighbours: the middles of lines."""
+    """Return differences (N, 3) to the ground of pixels that differ most around them: the middles of lines."""
     looked_at = np.zeros(frame.shape[:2], dtype=bool)
     for region in regions:
         looked_at[region.top : region.bottom, region.left : region.right] = True
@@ -93,17 +86,22 @@ def _colours_of_lines(frame: Frame, regions: Sequence[Region]) -> NDArray[np.flo
     for rows, difference in _differences(frame):
         size = np.linalg.norm(difference, axis=-1)
         peak = size >= cv2.dilate(size, np.ones((3, 3), np.uint8))
-        colours.append(difference[peak & (size > LEAST_DIFFERENCE) & looked_at[rows]])
+        # The least difference of a line from its ground, as a share of the ground's brightness, whose colour is read
+        # off.
+        colours.append(difference[peak & (size > 0.25) & looked_at[rows]])
     return np.concatenate(colours)
 
 
 def _differences(frame: Frame) -> Iterator[tuple[slice, NDArray[np.float32]]]:
     """Yield rows of a frame, and how their pixels (h, W, 3) differ from the ground, as shares of its brightness."""
     height, width = frame.shape[:2]
-    factor = max(1, round(width / LOOKED_AT_WIDTH_PX))
+    # Width of the reduced picture in which the ground is estimated: lines are thin there.
+    factor = max(1, round(width / 640))
     small = cv2.resize(frame, (width // factor, height // factor), interpolation=cv2.INTER_AREA)
-    ground = cv2.resize(cv2.medianBlur(small, GROUND_PX), (width, height), interpolation=cv2.INTER_LINEAR)
+    # Side of the square whose median is the ground, px at that width: more than twice as wide as any line.
+    ground = cv2.resize(cv2.medianBlur(small, 21), (width, height), interpolation=cv2.INTER_LINEAR)
     for top in range(0, height, ROWS):
         rows = slice(top, min(top + ROWS, height))
-        pixels, there = (np.asarray(part[rows], dtype=np.float32) + np.float32(DARK) for part in (frame, ground))
+        # Grey levels added to all brightness: what is black anyway has no colour.
+        pixels, there = (np.asarray(part[rows], dtype=np.float32) + np.float32(4.0) for part in (frame, ground))
         yield rows, pixels / there - 1

@@ -14,22 +14,13 @@ from worker.calibration.detection.contrast import BLUE, GREEN, RED, Channels
 from worker.calibration.detection.streaks import DIRECTIONS, LEAST_CONTRAST, LEVELS, Streaks, level_of
 from worker.calibration.geometry.visibility import VisibleLines
 
-WORKING_PX = 960
-"""Columns of the reduced picture in which streaks are looked for."""
-SURROUNDINGS_PX = 121
-"""A streak is measured by what is usual in such a square of the reduced picture: texture is full of streaks."""
-STANDS_OUT = 2.0
-"""Times the usual from which a streak may be a line; one of twice that is called one for sure."""
-DIRECTIONS_APART = 0.75
-"""How far the direction of a streak may be from that of a line, in steps between two directions."""
-MASK_PX = 8
-"""Side of the squares in which it is told where lines can be."""
-
 
 def ridge_response(channels: Channels, lines: VisibleLines, reach_px: float) -> NDArray[np.float32]:
-    """How much (H, W), in 0..1, each pixel looks like one of `lines` that is at most `reach_px` from there."""
+    """Return a response (H, W) in 0..1: how much each pixel looks like one of `lines` at most `reach_px` away."""
     height, width = channels[GREEN].shape
-    size = (min(WORKING_PX, width), max(1, round(height * min(1.0, WORKING_PX / width))))
+    # Columns of the reduced picture in which streaks are looked for.
+    working_px = 960
+    size = (min(working_px, width), max(1, round(height * min(1.0, working_px / width))))
     scale = size[0] / width
     reduced = [cv2.resize(channels[channel], size, interpolation=cv2.INTER_AREA) for channel in (BLUE, GREEN, RED)]
     streaks = Streaks.of(np.rint(np.dstack(reduced)).astype(np.uint8))
@@ -39,7 +30,8 @@ def ridge_response(channels: Channels, lines: VisibleLines, reach_px: float) -> 
     for number in range(DIRECTIONS):
         apart = np.abs((direction - number + DIRECTIONS / 2) % DIRECTIONS - DIRECTIONS / 2)
         for which in range(LEVELS):
-            expected = (level == which) & (apart <= DIRECTIONS_APART)
+            # Largest angle between a streak and a line, in steps between two directions.
+            expected = (level == which) & (apart <= 0.75)
             if expected.any():
                 near = _within(lines.pixel[expected] * scale, reach_px * scale, size)
                 likely = cv2.resize(_likelihood(streaks.strength[which][number], which), size)
@@ -48,20 +40,24 @@ def ridge_response(channels: Channels, lines: VisibleLines, reach_px: float) -> 
 
 
 def _likelihood(strength: NDArray[np.uint8], level: int) -> NDArray[np.float32]:
-    """How likely (h, w) streaks of a level are lines, 0..1, beside what is usual around them."""
-    side = SURROUNDINGS_PX // 2**level | 1
+    """Return the likelihood (h, w), 0..1, that streaks of a level are lines, beside what is usual around them."""
+    # A streak is compared with the mean of its surroundings: texture is full of streaks.
+    side = 121 // 2**level | 1
     values = strength.astype(np.float32)
-    usual = np.maximum(STANDS_OUT * cv2.blur(values, (side, side)), LEAST_CONTRAST)
+    # Twice the usual may be a line; four times is one for sure.
+    usual = np.maximum(2.0 * cv2.blur(values, (side, side)), LEAST_CONTRAST)
     return np.asarray(np.clip(values / usual - 1, 0, 1), dtype=np.float32)
 
 
 def _within(pixels: NDArray[np.float64], reach_px: float, size: tuple[int, int]) -> NDArray[np.float32]:
-    """1 (H, W) where any of the pixels (N, 2) is at most about `reach_px` away, 0 elsewhere."""
-    coarse = np.zeros((-(-size[1] // MASK_PX), -(-size[0] // MASK_PX)), dtype=np.uint8)
-    column, row = np.clip((pixels / MASK_PX).astype(int).T, 0, [[coarse.shape[1] - 1], [coarse.shape[0] - 1]])
+    """Return 1 (H, W) where any of the pixels (N, 2) is at most about `reach_px` away, 0 elsewhere."""
+    # Side of the squares of the mask of where lines can be.
+    mask_px = 8
+    coarse = np.zeros((-(-size[1] // mask_px), -(-size[0] // mask_px)), dtype=np.uint8)
+    column, row = np.clip((pixels / mask_px).astype(int).T, 0, [[coarse.shape[1] - 1], [coarse.shape[0] - 1]])
     coarse[row, column] = 1
-    reach = max(1, round(reach_px / MASK_PX))
+    reach = max(1, round(reach_px / mask_px))
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1,) * 2)
     coarse = np.asarray(cv2.dilate(coarse, disc), dtype=np.uint8)
-    near = np.repeat(np.repeat(coarse, MASK_PX, axis=0), MASK_PX, axis=1)[: size[1], : size[0]]
+    near = np.repeat(np.repeat(coarse, mask_px, axis=0), mask_px, axis=1)[: size[1], : size[0]]
     return near.astype(np.float32)

@@ -9,24 +9,24 @@ from numpy.typing import NDArray
 from worker.calibration.geometry.camera import Array, Plane
 
 MOST_ROWS = 32766
-"""And columns too: cv2.remap takes maps of no more."""
-ROW = 1024
-"""Any number of points is laid out in rows of this length."""
+"""Most rows of a map for cv2.remap, and most columns."""
 FAR_OUTSIDE = -1e6
 
 
 def bilinear(image: NDArray[np.float32], pixels: Array, outside: float = 0.0) -> NDArray[np.float32]:
-    """Values (...) of an image (H, W) at pixels (..., 2); `outside` where a pixel is not in the picture or NaN."""
+    """Sample an image (H, W) at pixels (..., 2); `outside` where a pixel is not in the picture or NaN."""
     flat = pixels.reshape(-1, 2)
-    rows = -(-len(flat) // ROW)
-    where = np.full((2, rows * ROW), FAR_OUTSIDE, dtype=np.float32)
+    # Length of the rows in which any number of points is laid out.
+    length = 1024
+    rows = -(-len(flat) // length)
+    where = np.full((2, rows * length), FAR_OUTSIDE, dtype=np.float32)
     where[:, : len(flat)] = flat.T
-    values = bilinear_planes(image, where[0].reshape(rows, ROW), where[1].reshape(rows, ROW), outside)
+    values = bilinear_planes(image, where[0].reshape(rows, length), where[1].reshape(rows, length), outside)
     return values.reshape(-1)[: len(flat)].reshape(pixels.shape[:-1])
 
 
 def bilinear_planes(image: NDArray[np.float32], column: Plane, row: Plane, outside: float = 0.0) -> NDArray[np.float32]:
-    """The same for columns and rows (P, N) apart, N at most `MOST_ROWS`."""
+    """Sample an image (H, W) at columns and rows (P, N) apart, N at most `MOST_ROWS`; see `bilinear`."""
     # fmax and fmin take the number where the other one is NaN.
     x, y = (
         np.fmin(np.fmax(plane, FAR_OUTSIDE), -FAR_OUTSIDE).astype(np.float32, copy=False) for plane in (column, row)

@@ -4,7 +4,7 @@ The network sees the frame as the camera took it. Undistorting first would stret
 as many pixels and blur what it stretches; the lens model is in the projection instead.
 
 It sees frames of more than about 2.5K shrunk to half: a quarter of the work, and on a real pair of 3072 x 1728 pixels
-the same poses to 0.01 px on clicked points. What the last pixel knows, the finish reads from the frame itself.
+the same poses to 0.01 px on clicked points. The refinement reads the frame itself.
 """
 
 from __future__ import annotations
@@ -36,9 +36,9 @@ REGION_PX = 1920
 As large as memory allows, one after the other: small ones pay for their halos, and batches of them gain nothing.
 """
 OVERVIEW_WIDTH_PX = 768
-"""Width of an overview: a sixth of the pixels that the network sees of a 4K frame, and of what they cost."""
+"""Width of an overview: a sixth of the pixels that the network sees of a 4K frame, and of their cost."""
 WORKING_WIDTH_PX = 1920
-"""About the width that the network sees frames at; the three lengths above are in pixels as it sees them."""
+"""Approximate width at which the network sees frames; the three lengths above are in such pixels."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class Region:
     bottom: int
 
     def shrunk(self, factor: int) -> Region:
-        """The same rectangle of the frame shrunk by `factor`."""
+        """Return the rectangle in the frame shrunk by `factor`."""
         return Region(self.left // factor, self.top // factor, self.right // factor, self.bottom // factor)
 
 
@@ -68,7 +68,7 @@ class Segmenter:
 
     @cached_property
     def session(self) -> ort.InferenceSession:
-        """The network, ready to run."""
+        """ONNX Runtime session of the network."""
         import onnxruntime as ort
 
         if self._provider not in ort.get_available_providers():
@@ -99,7 +99,7 @@ class Segmenter:
         return options
 
     def __call__(self, frame: Frame, regions: Sequence[Region]) -> NDArray[np.uint8]:
-        """Probabilities of a BGR frame (H, W, 3) as (H, W) in 0..255; 0 outside the regions.
+        """Return probabilities of a BGR frame (H, W, 3) as (H, W) in 0..255; 0 outside the regions.
 
         Steps of 1/255 are finer than the network knows, and take away what threads change in the last digits.
         """
@@ -130,7 +130,7 @@ class Segmenter:
         return response
 
     def _all_of(self, frame: Frame) -> NDArray[np.uint8]:
-        """Probabilities (H, W) in 0..255 of a small frame, seen at once."""
+        """Return probabilities (H, W) in 0..255 of a small frame, seen at once."""
         height, width = frame.shape[:2]
         padded = np.pad(frame, ((0, -height % GRID_PX), (0, -width % GRID_PX), (0, 0)), mode="reflect")
         return np.rint(self._probabilities(padded)[:height, :width] * 255).astype(np.uint8)
@@ -146,14 +146,14 @@ def _resized(picture: NDArray[np.uint8], size: tuple[int, int], interpolation: i
 
 
 class ProviderMissing(Exception):  # noqa: N818
-    """ONNX Runtime as installed cannot compute on what was asked for."""
+    """ONNX Runtime as installed lacks the requested provider."""
 
     def __init__(self, provider: str, available: Sequence[str]) -> None:
         super().__init__(f"ONNX Runtime here has no {provider}, only {', '.join(available)}.")
 
 
 def shrinking(size: tuple[int, int]) -> int:
-    """How many pixels of a frame of `size` (width, height) become one, each way, before the network sees it."""
+    """Return the factor by which a frame of `size` (width, height) is shrunk before the network sees it."""
     return max(1, round(size[0] / WORKING_WIDTH_PX))
 
 
@@ -166,7 +166,7 @@ def overview(frame: Frame) -> Frame:
 
 
 def whole_frame(size: tuple[int, int]) -> list[Region]:
-    """Regions that cover all of a frame of `size` (width, height)."""
+    """Return regions that cover all of a frame of `size` (width, height)."""
     grid, largest = _grid(size)
     width, height = (_up_to(grid, side) for side in size)
     return [
@@ -177,7 +177,7 @@ def whole_frame(size: tuple[int, int]) -> list[Region]:
 
 
 def reachable_regions(pitch: Field, camera: Camera, reach_px: float) -> list[Region]:
-    """Where in the frame a marking can be that is at most `reach_px` from where the pose puts it.
+    """Return the regions of a frame in which a marking can be at most `reach_px` from where the pose puts it.
 
     Columns of a region's largest width, each cut to the rows that lines can reach there.
     """
@@ -193,17 +193,17 @@ def reachable_regions(pitch: Field, camera: Camera, reach_px: float) -> list[Reg
 
 
 def _grid(size: tuple[int, int]) -> tuple[int, int]:
-    """Step and largest side of regions, in pixels of a frame of `size`."""
+    """Return step and largest side of regions, in pixels of a frame of `size`."""
     return GRID_PX * shrinking(size), REGION_PX * shrinking(size)
 
 
 def _near_columns(pixels: Array, left: int, right: int, reach_px: float) -> Array:
-    """Rows (K,) of the pixels (N, 2) that can come between two columns."""
+    """Return rows (K,) of the pixels (N, 2) that can come between two columns."""
     return pixels[(pixels[:, 0] >= left - reach_px) & (pixels[:, 0] < right + reach_px), 1]
 
 
 def _rows(y: Array, size: tuple[int, int], reach_px: float) -> Iterator[tuple[int, int]]:
-    """Stretches of rows within `reach_px` of any of `y`, on the grid, each at most a region's largest height."""
+    """Yield stretches of rows within `reach_px` of any of `y`, on the grid, each at most a region's largest height."""
     height = size[1]
     grid, largest = _grid(size)
     y = np.sort(y[(y >= -reach_px) & (y <= height - 1 + reach_px)])

@@ -1,4 +1,4 @@
-"""How far edges are smeared: the blur of a lens, measured in the frame itself."""
+"""Blur of a lens, measured at edges in the frame itself."""
 
 from __future__ import annotations
 
@@ -8,22 +8,13 @@ from numpy.typing import NDArray
 
 from worker.calibration.geometry.camera import Array, Frame
 
-STEEPEST_OF_A_CELL_PX = 16
-"""Edges are taken one from each square of so many pixels of the small picture, so that no caption decides."""
-LEAST_STEP = 14.0
-"""Of 255: fainter edges drown in noise and texture."""
 FEWEST_EDGES = 12
-MOST_EDGES = 200
-SHARP_SHARE = 0.3
-"""A picture is as sharp as the edges at this quantile: shadows and grass have soft edges in a sharp picture too."""
 REACH = 14
-"""Profiles reach so many steps to either side of an edge."""
-FADED = 0.15
-"""An edge ends where it is less steep than this part of its steepest place."""
+"""Steps of a profile to either side of an edge."""
 
 
 def edge_blur_px(frame: Frame, small: NDArray[np.uint8], where: NDArray[np.bool_]) -> float | None:
-    """Standard deviation, in pixels of `frame`, of the blur of its sharper edges; None where there are too few.
+    """Return the standard deviation, in pixels of `frame`, of the blur of its sharper edges; None with too few.
 
     small (h, w): the grey picture reduced; where (h, w): which part of it counts.
     """
@@ -35,25 +26,28 @@ def edge_blur_px(frame: Frame, small: NDArray[np.uint8], where: NDArray[np.bool_
     # A profile that is right for a sharp edge is too short for a smeared one, and the other way round.
     for step in (scale / 4, scale, 3 * scale):
         width, height, inner = _edges(_profiles(frame, (pixel + 0.5) * scale - 0.5, direction, step))
-        good = (height >= LEAST_STEP) & inner
+        # Least height of an edge, of 255: fainter ones drown in noise and texture.
+        good = (height >= 14.0) & inner
         widths.append(np.where(good, width * step, np.nan))
     known = np.stack(widths)
     first = np.take_along_axis(known, np.argmax(np.isfinite(known), axis=0)[None], axis=0)[0]
     first = first[np.isfinite(first)]
-    return float(np.quantile(first, SHARP_SHARE)) if len(first) >= FEWEST_EDGES else None
+    # Quantile of the edges' blur that is the picture's: shadows and grass have soft edges in a sharp picture too.
+    return float(np.quantile(first, 0.3)) if len(first) >= FEWEST_EDGES else None
 
 
 def _steep_places(small: NDArray[np.uint8], where: NDArray[np.bool_]) -> tuple[Array, Array]:
-    """The steepest pixels (N, 2), one of each cell, and the direction (N, 2) in which it gets brighter there."""
+    """Return the steepest pixels (N, 2), one of each cell, and the direction (N, 2) in which it gets brighter there."""
     smooth = cv2.GaussianBlur(small, (0, 0), 1.2).astype(np.float32)
     right, down = cv2.Sobel(smooth, cv2.CV_32F, 1, 0), cv2.Sobel(smooth, cv2.CV_32F, 0, 1)
     steep = cv2.magnitude(right, down) * where
-    cell = STEEPEST_OF_A_CELL_PX
+    # Side of the squares of the small picture from which one edge each is taken, so that no caption decides.
+    cell = 16
     rows, columns = small.shape[0] // cell, small.shape[1] // cell
     squares = steep[: rows * cell, : columns * cell].reshape(rows, cell, columns, cell).swapaxes(1, 2)
     blocks = squares.reshape(rows * columns, -1)
     best = blocks.argmax(axis=1)
-    strongest = np.argsort(-blocks[np.arange(len(blocks)), best])[:MOST_EDGES]
+    strongest = np.argsort(-blocks[np.arange(len(blocks)), best])[:200]
     row = strongest // columns * cell + best[strongest] // cell
     column = strongest % columns * cell + best[strongest] % cell
     slope = np.stack([right[row, column], down[row, column]], axis=1).astype(float)
@@ -63,7 +57,7 @@ def _steep_places(small: NDArray[np.uint8], where: NDArray[np.bool_]) -> tuple[A
 
 
 def _profiles(frame: Frame, pixel: Array, direction: Array, step: float) -> Array:
-    """Brightness (N, 2 REACH + 1) along directions (N, 2) through pixels (N, 2), averaged a little to either side."""
+    """Read the brightness (N, 2 REACH + 1) along directions (N, 2) through pixels (N, 2), averaged aside."""
     along = np.stack([-direction[:, 1], direction[:, 0]], axis=1)
     offsets = step * np.arange(-REACH, REACH + 1)
     total = np.zeros((len(pixel), len(offsets)))
@@ -78,7 +72,7 @@ def _profiles(frame: Frame, pixel: Array, direction: Array, step: float) -> Arra
 
 
 def _edges(profiles: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Of the steepest rise in profiles (N, S): its standard deviation in steps, its height, whether it ends inside."""
+    """Measure the steepest rise in profiles (N, S): standard deviation in steps, height, True if it ends inside."""
     slope = np.diff(profiles, axis=1)
     slope = (
         np.pad(slope, ((0, 0), (1, 1)), mode="edge")[:, :-2]
@@ -88,7 +82,8 @@ def _edges(profiles: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
     steepest = slope.argmax(axis=1)
     peak = slope.max(axis=1)
     row = np.arange(len(slope))
-    rising = slope > FADED * peak[:, None]
+    # Slope at which an edge ends, as a part of that at its steepest place.
+    rising = slope > 0.15 * peak[:, None]
     # From the steepest place outwards, as long as it rises.
     index = np.arange(slope.shape[1])
     after = np.where(~rising & (index > steepest[:, None]), index, slope.shape[1]).min(axis=1)

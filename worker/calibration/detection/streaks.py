@@ -12,27 +12,25 @@ from worker.calibration.geometry.camera import Array, Frame
 from worker.calibration.geometry.visibility import VisibleLines
 
 DIRECTIONS = 8
-"""Streaks are looked for in so many directions; between two of them little is lost."""
+"""Number of directions in which streaks are looked for; between two of them little is lost."""
 BESIDE_PX = 3
-"""How far beside the middle of a streak its surroundings are read."""
-WIDEST_PX = 2.5
-"""Lines wider than that are looked for in a picture half as large, or again half of that."""
+"""Distance from the middle of a streak at which its surroundings are read."""
 LEVELS = 3
 ALONG_PX = 3
-"""A streak is averaged over so much of its length, to either side."""
+"""Length, to either side, over which a streak is averaged."""
 LEAST_CONTRAST = 5.0
-"""Of 255: fainter streaks are texture, and nothing after this could measure them."""
+"""Least contrast of a streak, of 255: fainter ones are texture, and nothing after this could measure them."""
 
 
 @dataclass(frozen=True)
 class Streaks:
-    """How much (levels, directions, H, W) a pixel stands out from both sides; coarser levels are repeated to size."""
+    """Contrast (levels, directions, H, W) of pixels against both of their sides, level by level."""
 
     strength: tuple[NDArray[np.uint8], ...]
 
     @classmethod
     def of(cls, picture: Frame) -> Streaks:
-        """Those of a picture (H, W, 3), in all directions and widths."""
+        """Return the streaks of a picture (H, W, 3), in all directions and widths."""
         levels = [_streaks(picture)]
         for level in range(1, LEVELS):
             smaller = cv2.resize(picture, None, fx=0.5**level, fy=0.5**level, interpolation=cv2.INTER_AREA)
@@ -40,7 +38,7 @@ class Streaks:
         return cls(tuple(levels))
 
     def widened(self, by_px: int) -> Streaks:
-        """The same with every streak as strong as the strongest within half of `by_px`."""
+        """Return the streaks dilated: every pixel has the strongest one within half of `by_px`."""
         return Streaks(
             tuple(
                 np.stack([cv2.dilate(plane, np.ones((by_px // 2**level | 1,) * 2, np.uint8)) for plane in planes])
@@ -49,7 +47,7 @@ class Streaks:
         )
 
     def read(self, lines: VisibleLines, pixels: Array) -> NDArray[np.float32]:
-        """Strength (N, K) at pixels (N, K, 2) of streaks as wide as N lines and in their directions; 0 outside."""
+        """Return the strength (N, K) at pixels (N, K, 2) of streaks with the widths and directions of N lines."""
         level, direction = level_of(lines.width_px), direction_of(lines.normal)[:, None]
         values = np.zeros(pixels.shape[:-1], np.float32)
         for number, planes in enumerate(self.strength):
@@ -65,9 +63,9 @@ class Streaks:
 
 
 def _streaks(picture: Frame) -> NDArray[np.uint8]:
-    """Strength (directions, H, W) of streaks across which the normal points at multiples of 180° / `DIRECTIONS`.
+    """Return the strength (directions, H, W) of streaks whose normals are at multiples of 180° / `DIRECTIONS`.
 
-    In the channel that shows each best: blue paint on wood and orange paint on turf are as bright as their ground.
+    The channel that shows each best counts: blue paint on wood and orange paint on turf are as bright as their ground.
     """
     border = BESIDE_PX + ALONG_PX + 2
     height, width, _ = picture.shape
@@ -95,11 +93,12 @@ def _moved(padded: NDArray[np.uint8], by: NDArray[np.intp], border: int) -> NDAr
 
 
 def level_of(width_px: Array) -> NDArray[np.intp]:
-    """The level (N,) in which lines so wide (N,) are looked for."""
-    return np.clip(np.ceil(np.log2(np.maximum(width_px, 1e-3) / WIDEST_PX)), 0, LEVELS - 1).astype(np.intp)
+    """Return the level (N,) in which lines of a width (N,) are looked for."""
+    # Widest lines of a level; wider ones are looked for in a picture half as large, or again half of that.
+    return np.clip(np.ceil(np.log2(np.maximum(width_px, 1e-3) / 2.5)), 0, LEVELS - 1).astype(np.intp)
 
 
 def direction_of(normal: Array) -> NDArray[np.intp]:
-    """The direction (N,) in which lines with these normals (N, 2) are looked for."""
+    """Return the direction (N,) in which lines with these normals (N, 2) are looked for."""
     angle = np.arctan2(normal[:, 1], normal[:, 0])
     return np.rint(angle / (np.pi / DIRECTIONS)).astype(np.intp) % DIRECTIONS

@@ -1,4 +1,4 @@
-"""Whether a view can be used at all, and what is wrong with it if not: judged before anything is searched.
+"""Judgement of a view before any search: whether it is usable, and the cause if not.
 
     condition = look_at(frame, pitch, camera, usual)
 
@@ -25,76 +25,39 @@ from worker.calibration.geometry.plausible_pose import films_a_field
 from worker.calibration.geometry.visibility import VisibleLines
 
 Spoiled = Literal["dark", "fogged", "blinded", "snow", "out-of-focus", "blocked"]
-"""What a picture itself can show."""
+"""Causes that a picture itself can show."""
 OF_THE_GROUND: tuple[Spoiled, ...] = ("fogged", "snow", "blocked")
-"""What a picture shows only if it is known where in it the ground is."""
+"""Causes that a picture shows only if the place of the ground in it is known."""
 Cause = Spoiled | Literal["other-camera", "no-markings-in-view"]
 Mask = NDArray[np.bool_]
 
-LOOKED_AT_PX = 960
-"""Columns of the reduced picture that all but the sharpness is judged on."""
 CELLS = 40
-"""Columns of squares that the picture is judged in."""
-REACH_RAD = 0.1
-"""A stored pose may be off by so much."""
-NARROWEST_PX = 0.5
-"""Lines that are narrower in the reduced picture are not asked for, unless there are hardly others."""
-SPACING_PX = 8.0
-"""Between two places on a line that are looked at."""
+"""Columns of squares in which the picture is judged."""
 FEWEST_PLACES, FEWEST_CELLS = 20, 12
-"""On lines, and of the field: fewer say nothing."""
+"""Fewest places on lines, and fewest cells of the field, for a judgement."""
 
-FINEST_PX, COARSEST_PX = 1.5, 31
-"""Structure is what lies between: coarser than noise, finer than shading."""
-NEAR_CELLS, FAR_CELLS = 2.0, 6.0
-"""How far around a cell its lines are counted, and farther where it has none; standard deviations."""
-PRIOR_PLACES = 1.0
-"""So many places in a surrounding weigh as much as what is known from farther around."""
-NOISE_ROWS = 16
-"""Every so many rows of the frame the noise is measured."""
 
-LOST, MOSTLY = 0.3, 0.5
-"""Lines are lost where less than the first share of them is found, a place where more than the second of it is lost."""
 LEAST_SPOILED = 0.2
-"""A view is usable while less than this share of the visible field is dark, fogged or under snow..."""
+"""Share of the visible field below which dark, fog or snow leave a view usable."""
 LEAST_HIDDEN = 0.25
-"""...or is hidden by something that cannot be told so surely."""
+"""Share of the visible field below which something that cannot be told so surely may hide it."""
 BLIND = 0.12
-"""...or, where the sun blinds, is blown out: the veil around it takes the rest."""
+"""Share of the visible field that may be blown out where the sun blinds: the veil around it takes the rest."""
 LEAST_LIGHT = 16.0
-"""Of 255, of the brightest channel..."""
-LEAST_LIGHT_OVER_NOISE = 2.0
+"""Least brightness of the field, of 255, in the brightest channel."""
 DIM = 60.0
-"""...and noise hides the lines only of a field darker than this."""
-BLOWN_OUT = 245
-"""A pixel is blown out whose darkest channel is brighter."""
-PALE = 0.15
-"""Saturation under which a place may be fog or snow..."""
-FOG_IS_BRIGHTER, SNOW_IS_BRIGHTER, SURELY_SNOW = 70.0, 165.0, 230.0
-"""...fog lifts the black, snow is bright, and fog is never white..."""
-FLAT, NEARLY_FLAT = 2.0, 4.0
-"""...by grey levels by which a place varies that shows nothing, or little of what is there; fallen snow varies more."""
+"""Brightness above which noise never hides the lines of a field."""
 MOST_BLUR_PX = 3.5
-"""In pixels of a frame of 1920 columns; sharp lenses show 0.3 to 1.7."""
-SOFT_PX = 1.2
-"""Sharper edges are in focus; also of 1920 columns, as the next but one."""
-BLUR_OF_USUAL = 3.0
+"""Largest blur of a lens in focus, in pixels of a frame of 1920 columns; sharp lenses show 0.3 to 1.7."""
 LEAST_UNUSUAL_BLUR_PX = 2.2
-"""More than so many times what this camera usually shows is out of focus as well, unless it is still sharp."""
-GOOD_LINES, OF_USUAL_LINES = 0.5, 0.4
-"""Share of the places on lines that a view surely has when it sees lines; of that, what is left where it sees none."""
-OTHER_TINT, OTHER_LIGHT, OTHER_STRUCTURE, OTHER_BLUR = 0.06, 3.5, 2.5, 1.5
-"""What stands in front differs so from the ground that is seen: in a channel's share, in light, in structure, in
-sharpness. A hard shadow has the ground's tint and seldom less than a third of its light."""
+"""Least blur of a view out of focus by comparison with its usual blur, in pixels of a frame of 1920 columns."""
 PLAIN, PATTERNED = 0.7, 5.0
-"""Structure below which nothing is a ground, and above which nothing is one that is smeared so..."""
-MOST_PATTERNED = 0.05
-"""...or is fogged, where more than this share of what has no lines is above it."""
+"""Structure below which nothing is a ground, and above which nothing is a smeared one."""
 
 
 @dataclass(frozen=True)
 class ViewFigures:
-    """What was measured on the part of the frame that shows the field.
+    """Measurements on the part of a frame that shows the field.
 
     `brightness`: median of the brightest channel, 0..255; `noise`: of a pixel; `contrast`: of the lines that were
     found, in grey levels, 0 without any; `lines_found`: share of the expected places on lines; `blur_px`: of edges,
@@ -116,7 +79,7 @@ class ViewFigures:
 
 @dataclass(frozen=True)
 class UsualView:
-    """What this camera showed in the last accepted job, see `ViewFigures`."""
+    """Figures of the camera's last accepted job, see `ViewFigures`."""
 
     lines_found: float | None
     blur_px: float | None
@@ -124,7 +87,7 @@ class UsualView:
 
 @dataclass(frozen=True)
 class ViewCondition:
-    """`cause`, `where` (which part of the visible field): None of a usable view. `words`: one sentence for people."""
+    """Judgement of a view in `words`. `cause` and `where` in the visible field: None for a usable view."""
 
     usable: bool
     cause: Cause | None
@@ -136,17 +99,19 @@ class ViewCondition:
 def look_at(frame: Frame, pitch: Field, camera: Camera, usual: UsualView | None = None) -> ViewCondition:
     """Judge a frame (H, W, 3) of `camera`, whose stored pose may be some degrees off.
 
-    `usual`: what the last accepted job of this camera saw, which tell a soft lens from one out of focus and a
-    field of faint lines from one that is hidden.
+    `usual`: figures of the camera's last accepted job, which tell a soft lens from one out of focus and a field of
+    faint lines from one that is hidden.
     """
-    scale = LOOKED_AT_PX / camera.intrinsics.size[0]
+    # Columns of the reduced picture on which all but the sharpness is judged.
+    scale = 960 / camera.intrinsics.size[0]
     reduced = camera.with_lens(camera.intrinsics.scaled(scale))
     small = np.asarray(cv2.resize(frame, reduced.intrinsics.size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
     grey = np.asarray(cv2.cvtColor(small, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
     lines = _expected_lines(pitch, reduced)
     ground = _Ground.of(pitch, reduced)
     cells = _Cells.of(small, ground.size)
-    sight = look_for_lines(small, lines, REACH_RAD * reduced.intrinsics.focal_length_px)
+    # A stored pose may be off by so much.
+    sight = look_for_lines(small, lines, 0.1 * reduced.intrinsics.focal_length_px)
     lost = ground.field & _lost(sight, ground)
     noise = _noise(frame, ground.field)
     sharpness = _Sharpness.of(frame, grey, ground.field, lost)
@@ -164,8 +129,8 @@ def look_at(frame: Frame, pitch: Field, camera: Camera, usual: UsualView | None 
 
 
 def least_light(noise: float, least: float = LEAST_LIGHT) -> float:
-    """How bright (0..255) a field has to be, at least `least`, to show its lines through the `noise` of a pixel."""
-    return max(least, LEAST_LIGHT_OVER_NOISE * noise)
+    """Return the least brightness (0..255) of a field that shows lines through the `noise` of a pixel."""
+    return max(least, 2.0 * noise)
 
 
 def _cause(
@@ -177,10 +142,10 @@ def _cause(
     figures: ViewFigures,
     usual: UsualView | None,
 ) -> tuple[Spoiled | None, Mask]:
-    """The likeliest cause, and the cells it took; the surest causes first."""
+    """Return the likeliest cause, and the cells it took; the surest causes first."""
     enough = LEAST_SPOILED * field.sum()
     lit = field & ~spoiled["dark"] & (cells.brightest > DIM)
-    # What is black beside a field that is lit is an object, or a shadow.
+    # Black beside a field that is lit is an object, or a shadow.
     if spoiled["dark"].sum() >= enough and lit.sum() < FEWEST_CELLS:
         return "dark", spoiled["dark"]
     pale = spoiled["veiled"] | spoiled["white"]
@@ -191,7 +156,7 @@ def _cause(
         if spoiled["veiled"].sum() < spoiled["white"].sum():
             return "snow", pale
         # Fog takes the contrast of edges and leaves their width, and nothing stands out of it.
-        if not smeared and (cells.structure[lost] > PATTERNED).mean() < MOST_PATTERNED:
+        if not smeared and (cells.structure[lost] > PATTERNED).mean() < 0.05:
             return "fogged", pale
     if figures.hidden >= LEAST_HIDDEN and _is_blocked(cells, field, lost, sharpness, smeared, figures, usual):
         return "blocked", lost
@@ -207,13 +172,15 @@ def _is_blocked(
     figures: ViewFigures,
     usual: UsualView | None,
 ) -> bool:
-    """Whether the cells without lines are no ground: other than the ground beside them, or like none."""
+    """True if the cells without lines are no ground: unlike the ground beside them, or unlike any ground."""
     clear = field & ~lost
     if lost.sum() < FEWEST_CELLS:
         return False
     structure = np.median(cells.structure[lost])
     before = usual.lines_found if usual is not None and usual.lines_found is not None else 0.0
-    gone = before > GOOD_LINES and figures.lines_found < OF_USUAL_LINES * before
+    # Share of the lines that a view surely has when it sees lines; and of that, the share that is left where it sees
+    # none.
+    gone = before > 0.5 and figures.lines_found < 0.4 * before
     if clear.sum() >= FEWEST_CELLS:
         # A shadow differs as well, but what lies in it is as sharp as the rest, and most of its lines are still seen.
         near = sharpness.of_lost is None or structure < PLAIN or sharpness.differs
@@ -221,7 +188,8 @@ def _is_blocked(
     if sharpness.of_all is None or (structure < PLAIN and not smeared):
         return True
     # Right before the lens things are out of focus; of a field out of focus no such contrast is left.
-    if structure > PATTERNED and sharpness.of_all > SOFT_PX * sharpness.size:
+    # Blur below which edges are in focus, in pixels of a frame of 1920 columns.
+    if structure > PATTERNED and sharpness.of_all > 1.2 * sharpness.size:
         return True
     return gone and not smeared
 
@@ -231,26 +199,28 @@ def _differ(cells: _Cells, one: Mask, other: Mask) -> bool:
     tint = float(np.abs(a / max(a.sum(), 1.0) - b / max(b.sum(), 1.0)).max())
     light = abs(np.log(max(a.sum(), 1.0) / max(b.sum(), 1.0)))
     structure = abs(np.log(max(np.median(cells.structure[one]), 0.3) / max(np.median(cells.structure[other]), 0.3)))
-    return bool(tint > OTHER_TINT or light > np.log(OTHER_LIGHT) or structure > np.log(OTHER_STRUCTURE))
+    # A hard shadow has the ground's tint and seldom less than a third of its light.
+    return bool(tint > 0.06 or light > np.log(3.5) or structure > np.log(2.5))
 
 
 def _spoiled(cells: _Cells, field: Mask, lost: Mask, noise: float) -> dict[str, Mask]:
-    """Which of the field's cells show what, by the names of `ViewFigures`, wherever that goes with lost lines."""
+    """Return the cells of the field that show each defect and have no lines, by the names of `ViewFigures`."""
     dim = cells.brightest < min(least_light(noise), DIM)
     blown = cells.blown > 0.5
-    pale = (cells.saturation < PALE) & (cells.darkest > FOG_IS_BRIGHTER) & ~blown
-    rough = (cells.structure > FLAT) & (cells.brightest > SNOW_IS_BRIGHTER)
-    white = pale & (rough | (cells.brightest > SURELY_SNOW))
-    veiled = pale & (cells.structure < NEARLY_FLAT) & ~white
+    # Fog and snow are pale. Fog lifts the black; snow is bright and varies; brighter still is surely no fog.
+    pale = (cells.saturation < 0.15) & (cells.darkest > 70.0) & ~blown
+    rough = (cells.structure > 2.0) & (cells.brightest > 165.0)
+    white = pale & (rough | (cells.brightest > 230.0))
+    veiled = pale & (cells.structure < 4.0) & ~white
     kinds = {"dark": dim, "blown_out": blown, "veiled": veiled, "white": white}
     return {name: _without_lines(kind & field, lost) for name, kind in kinds.items()}
 
 
 def _without_lines(kind: Mask, lost: Mask) -> Mask:
-    """The connected places of some cells that are mostly without lines; a place next to a line may be spoiled too."""
+    """Return the connected places of cells that are mostly without lines; a place next to a line may be spoiled too."""
     count, place = cv2.connectedComponents(kind.astype(np.uint8), connectivity=4)
     all_of, lost_of = (np.bincount(place.ravel(), part.ravel(), count) for part in (kind, lost & kind))
-    return (MOSTLY * all_of < lost_of)[place] & kind
+    return (0.5 * all_of < lost_of)[place] & kind
 
 
 def _figures(
@@ -276,29 +246,36 @@ def _figures(
 
 
 def _expected_lines(pitch: Field, camera: Camera) -> VisibleLines:
-    lines = VisibleLines.from_camera(pitch.line_points(), camera).thinned(SPACING_PX)
-    wide = lines.width_px >= NARROWEST_PX
+    lines = VisibleLines.from_camera(pitch.line_points(), camera).thinned(8.0)
+    # Narrowest lines in the reduced picture that are used, unless there are hardly others.
+    wide = lines.width_px >= 0.5
     return lines[wide] if wide.sum() >= 3 * FEWEST_PLACES else lines
 
 
 def _lost(sight: LinesInSight, ground: _Ground) -> Mask:
-    """Cells (h, w) in whose surroundings hardly any expected line is found; far from all lines, as farther around."""
+    """Return the cells (h, w) in whose surroundings hardly any expected line is found.
+
+    Far from all lines a cell takes the share of its farther surroundings.
+    """
     columns, rows = ground.size
     at = np.clip((sight.pixel / ground.cell_px).astype(int), 0, [columns - 1, rows - 1])
     expected, found = np.zeros((2, rows, columns))
     np.add.at(expected, (at[:, 1], at[:, 0]), 1.0)
     np.add.at(found, (at[:, 1], at[:, 0]), sight.found.astype(float))
     believed = np.full((rows, columns), float(sight.found.mean()) if len(sight.found) else 0.0)
-    for reach in (FAR_CELLS, NEAR_CELLS):
+    # Standard deviations of the farther and the nearer surroundings, in cells.
+    for reach in (6.0, 2.0):
         here, there = (cv2.GaussianBlur(plane, (0, 0), reach) for plane in (expected, found))
-        held = PRIOR_PLACES / reach**2
-        believed = (there + held * believed) / (here + held)
-    return np.asarray(believed < LOST)
+        # One place on a line weighs as much as what is known from farther around.
+        prior = 1.0 / reach**2
+        believed = (there + prior * believed) / (here + prior)
+    # Lines are lost where less than this share of them is found.
+    return np.asarray(believed < 0.3)
 
 
 def _noise(frame: Frame, field: Mask) -> float:
-    """Standard deviation of a pixel in the field, from what does not go on from one pixel to the next."""
-    rows = frame[::NOISE_ROWS, :, 1].astype(np.int16)
+    """Return the standard deviation of a pixel in the field, from second differences of neighbours."""
+    rows = frame[::16, :, 1].astype(np.int16)
     bend = np.abs(2 * rows[:, 1:-1] - rows[:, :-2] - rows[:, 2:])
     inside = _enlarged(field, bend.shape)
     # The median of |x| is 0.67 standard deviations, and of x - (y + z) / 2, doubled, the root of 6 of them.
@@ -349,7 +326,7 @@ def _words(cause: Spoiled, where: str, figures: ViewFigures, usual: UsualView | 
 
 @dataclass(frozen=True)
 class _Ground:
-    """Where the field is in the picture in squares (h, w): `field`, and how far away (m) it is there."""
+    """Squares (h, w) of the picture that show the `field`, and its distance (m) there."""
 
     field: Mask
     distance: Array
@@ -357,7 +334,7 @@ class _Ground:
 
     @classmethod
     def of(cls, pitch: Field, camera: Camera) -> _Ground:
-        """Of a reduced picture; the field's rim is left out where there is enough of it, as the pose may be off."""
+        """Return the ground in a reduced picture, without the field's rim where enough is left: the pose may be off."""
         width, height = camera.intrinsics.size
         cell = width / CELLS
         rows = max(1, round(height / cell))
@@ -380,7 +357,7 @@ class _Ground:
         return self.field.shape[1], self.field.shape[0]
 
     def name_of(self, part: Mask) -> str:
-        """What to call some of the field's cells: the named part of it that they share most with."""
+        """Return the name of the part of the field that shares most with some of its cells."""
         near = self.distance < np.median(self.distance[self.field])
         column = np.broadcast_to(np.arange(self.field.shape[1]), self.field.shape)
         edges = np.quantile(column[self.field], [1 / 3, 1 / 2, 2 / 3])
@@ -403,8 +380,8 @@ def _overlap(one: Mask, other: Mask) -> float:
 
 @dataclass(frozen=True)
 class _Sharpness:
-    """Blur of edges in px of the frame, None without edges: of all the field, where lines are found and where
-    they are not, both None unless there is enough of either.
+    """Blur of edges in px of the frame, None without edges: in all the field, where lines are found and where they are
+    not, the last two None unless there is enough of either.
 
     `size`: of the frame relative to one of 1920 columns, which the limits are for.
     """
@@ -416,7 +393,7 @@ class _Sharpness:
 
     @classmethod
     def of(cls, frame: Frame, grey: NDArray[np.uint8], field: Mask, lost: Mask) -> _Sharpness:
-        """Of a frame and its reduced grey picture, with the cells of the field and those without lines."""
+        """Measure the blur of a frame and its reduced grey picture, with the cells of the field and the lost ones."""
         clear = field & ~lost
         of_all = edge_blur_px(frame, grey, _enlarged(field, grey.shape))
         if min(clear.sum(), lost.sum()) < FEWEST_CELLS:
@@ -425,24 +402,25 @@ class _Sharpness:
         return cls(of_all, of_clear, of_lost, frame.shape[1] / 1920)
 
     def is_lost(self, usual: UsualView | None) -> bool:
-        """Whether the whole field is out of focus."""
+        """True if the whole field is out of focus."""
         if self.of_all is None:
             return False
         blur = self.of_all if self.of_clear is None else min(self.of_all, self.of_clear)
-        unusual = usual is not None and usual.blur_px is not None and blur > BLUR_OF_USUAL * usual.blur_px
+        # Unusual is a blur of three times the usual one, unless it is still small.
+        unusual = usual is not None and usual.blur_px is not None and blur > 3.0 * usual.blur_px
         return blur > (LEAST_UNUSUAL_BLUR_PX if unusual else MOST_BLUR_PX) * self.size
 
     @property
     def differs(self) -> bool:
-        """Whether what has no lines is smeared more than the rest."""
+        """True if the cells without lines are more blurred than the rest."""
         if self.of_clear is None or self.of_lost is None:
             return False
-        return self.of_lost > max(OTHER_BLUR * self.of_clear, LEAST_UNUSUAL_BLUR_PX * self.size)
+        return self.of_lost > max(1.5 * self.of_clear, LEAST_UNUSUAL_BLUR_PX * self.size)
 
 
 @dataclass(frozen=True)
 class _Cells:
-    """The picture in squares (h, w): mean of each channel's extremes, structure, what is blown out."""
+    """Picture in squares (h, w): mean of each channel's extremes, structure, share blown out, colour."""
 
     brightest: Array
     darkest: Array
@@ -452,7 +430,7 @@ class _Cells:
 
     @classmethod
     def of(cls, small: Frame, size: tuple[int, int]) -> _Cells:
-        """Of a reduced frame (H, W, 3), in so many columns and rows."""
+        """Return the cells of a reduced frame (H, W, 3), for `size` (columns, rows)."""
 
         def mean(plane: NDArray[np.generic]) -> Array:
             return np.asarray(cv2.resize(plane.astype(np.float32), size, interpolation=cv2.INTER_AREA), dtype=float)
@@ -460,9 +438,10 @@ class _Cells:
         blue, green, red = cv2.split(small)
         brightest, darkest = cv2.max(cv2.max(blue, green), red), cv2.min(cv2.min(blue, green), red)
         grey = cv2.cvtColor(small, cv2.COLOR_BGR2GRAY).astype(np.float32)
-        detail = cv2.GaussianBlur(grey, (0, 0), FINEST_PX) - cv2.blur(grey, (COARSEST_PX, COARSEST_PX))
+        # Structure is coarser than noise and finer than shading.
+        detail = cv2.GaussianBlur(grey, (0, 0), 1.5) - cv2.blur(grey, (31, 31))
         structure = np.sqrt(mean(detail * detail))
-        return cls(mean(brightest), mean(darkest), structure, mean(darkest >= BLOWN_OUT), mean(small))
+        return cls(mean(brightest), mean(darkest), structure, mean(darkest >= 245), mean(small))
 
     @property
     def saturation(self) -> Array:

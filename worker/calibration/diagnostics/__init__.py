@@ -1,1 +1,1 @@
-"""Reports on a result, measured without ground truth: markings, overlap, registration of pairs, the seam."""
+"""Diagnostics of a result without ground truth: markings, overlap, registration of pairs, the seam."""

@@ -1,9 +1,9 @@
-"""How far apart two cameras put the same markings, by the line points that both have measured.
+"""Registration of two cameras by the line points that both have measured.
 
 The same registration as that of two pictures of responses (`registration`), of their line centres seen from above:
-small turns and moves of both cameras that bring the paint of the one onto that of the other. It costs a hundredth,
-and does without the network. Each point is the same piece of line in both views: what is nearer to another line than
-to its own cannot be registered, which is for the responses to do.
+small turns and moves of both cameras that bring the paint of the one onto that of the other. It costs a hundredth, and
+does without the network. Each point is the same piece of line in both views: what is nearer to another line than to its
+own cannot be registered, which is for the responses to do.
 """
 
 from __future__ import annotations
@@ -28,22 +28,17 @@ from worker.calibration.geometry.camera import Array, Camera
 from worker.calibration.geometry.field import Field
 from worker.calibration.robust import huber_weights
 
-LEASTS = (1.0, 0.3, 0.1, 0.01)
-"""The part of the expected turns and moves that is expected at least, step by step (see `registration.FINE_STAGES`)."""
-ALIKE_M = 2.5
-"""Length of line over which two views are apart alike, by their lenses and by the ground: it counts as one point."""
-
 
 @dataclass(frozen=True)
 class MeasuredLines:
-    """A camera and the line points `measured` in its frame."""
+    """Camera and the line points `measured` in its frame."""
 
     camera: Camera
     measured: Measurements
 
 
 def register_lines(pitch: Field, first: MeasuredLines, second: MeasuredLines) -> Registration | None:
-    """Register the lines of two cameras around the pitch centre, or the markings in common nearest to it.
+    """Register the lines of two cameras around the field's centre, or the markings in common nearest to it.
 
     None where both have measured too little of the same lines to hold the views in the directions that they should.
     """
@@ -69,30 +64,32 @@ def register_lines(pitch: Field, first: MeasuredLines, second: MeasuredLines) ->
         np.einsum("md,mdj->mj", points.normal[:, :2], forms), apart, sigma, lines.spacing, at_centre
     )
 
-    held = directions_in_common(pitch, first.camera, second.camera, centre)
+    expected_directions = directions_in_common(pitch, first.camera, second.camera, centre)
     variance, directions = np.linalg.eigh(at_centre @ covariance @ at_centre.T)
-    told = directions[:, variance < LOOSE_M**2][:, :held]
-    if told.shape[1] < held:
+    directions_held = directions[:, variance < LOOSE_M**2][:, :expected_directions]
+    if directions_held.shape[1] < expected_directions:
         return None
-    dx, dy = told @ told.T @ at_centre @ moves / PIXEL_M
-    return Registration(float(dx), float(dy), support_m, (first.camera.id, second.camera.id), centre, told)
+    dx, dy = directions_held @ directions_held.T @ at_centre @ moves / PIXEL_M
+    return Registration(float(dx), float(dy), support_m, (first.camera.id, second.camera.id), centre, directions_held)
 
 
-def _moves(slopes: Array, apart: Array, sigma: Array, spacing_m: float, at_centre: Array) -> tuple[Array, Array]:
-    """The turns and moves (12,) of both cameras that put points as far (M,) m apart as they are, and their covariance.
+def _moves(jacobian: Array, apart: Array, sigma: Array, spacing_m: float, at_centre: Array) -> tuple[Array, Array]:
+    """Return the turns and moves (12,) of both cameras that explain distances `apart` (M,) m, and their covariance.
 
-    `slopes` (M, 12) of that by the moves; `at_centre` (2, 12) of the displacement there. What is expected shrinks with
-    the displacement that is found, and the covariance is that of cameras of which no more is known than is expected.
+    `jacobian` (M, 12): of those by the moves; `at_centre` (2, 12): of the displacement there. The prior shrinks with
+    the displacement found, and the covariance is that of cameras with the full prior.
     """
     expected = np.linalg.inv(at_centre @ at_centre.T)
-    alike = max(ALIKE_M / spacing_m, 1.0)
-    moves: Array = np.zeros(slopes.shape[1])
-    for least in LEASTS:
-        weight = huber_weights((apart - slopes @ moves) / sigma) / (sigma**2 * alike)
-        information = (slopes * weight[:, None]).T @ slopes
+    # Length of line over which two views differ alike, by their lenses and by the ground: it counts as one point.
+    alike = max(2.5 / spacing_m, 1.0)
+    moves: Array = np.zeros(jacobian.shape[1])
+    # Least part of the expected turns and moves that is expected, step by step (see `registration.FINE_STAGES`).
+    for least in (1.0, 0.3, 0.1, 0.01):
+        weight = huber_weights((apart - jacobian @ moves) / sigma) / (sigma**2 * alike)
+        information = (jacobian * weight[:, None]).T @ jacobian
         found = at_centre @ moves
         prior = 1 / max(float(found @ expected @ found), least**2)
         moves = np.asarray(
-            np.linalg.solve(information + prior * np.eye(len(moves)), slopes.T @ (weight * apart)), float
+            np.linalg.solve(information + prior * np.eye(len(moves)), jacobian.T @ (weight * apart)), float
         )
     return moves, np.asarray(np.linalg.inv(information + np.eye(len(moves))), dtype=float)

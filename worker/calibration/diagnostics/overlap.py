@@ -1,4 +1,4 @@
-"""How the segmentation covers the expected markings: what of them it finds, and what it finds beside them."""
+"""Overlap of the segmentation with the expected markings: the share of them it finds, and what it finds beside them."""
 
 from __future__ import annotations
 
@@ -14,15 +14,13 @@ from worker.calibration.geometry.camera import Array, Camera
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.visibility import VisibleLines
 
-AROUND_PITCH_M = 1.0
-
 
 @dataclass(frozen=True)
 class Overlap:
-    """How the segmentation of a frame covers the markings that the pose expects.
+    """Overlap of a frame's segmentation with the markings that the pose expects.
 
     `iou` 0..1, as lengths of line; its two sides: the share of the expected line that is `found`, and the share of the
-    segmentation on the pitch that is `unexpected`, beside all of it.
+    segmentation on the field that is `unexpected`, beside all of it.
     """
 
     iou: float
@@ -31,10 +29,10 @@ class Overlap:
 
 
 def overlap_of(pitch: Field, camera: Camera, response: NDArray[np.float32]) -> Overlap:
-    """The overlap of the markings expected by the pose and those in the segmentation (H, W).
+    """Measure the overlap of the markings expected by the pose with those in the segmentation (H, W).
 
     A line is thinner than any honest tolerance, so a plain IoU of pixels would measure paint and blur. Here a piece of
-    expected line is found when the segmentation has a marking within `TOLERANCE_PX` of it; segmentation on the pitch
+    expected line is found when the segmentation has a marking within `TOLERANCE_PX` of it; segmentation on the field
     that lies beside every expected line counts as as much line as it could have been. A line thinner than a pixel
     covers only a part of it, and has that part of the weight and of the response that is asked for.
     """
@@ -52,13 +50,13 @@ def overlap_of(pitch: Field, camera: Camera, response: NDArray[np.float32]) -> O
     beside_all = marked & _pitch_area(pitch, camera) & ~explained
     not_counted = left_out(pitch, camera)
     area_beside = int(np.count_nonzero(beside_all if not_counted is None else beside_all & ~not_counted))
-    beside = area_beside * found / area_explained if area_explained else float(area_beside)
+    unexpected_px = area_beside * found / area_explained if area_explained else float(area_beside)
     unexpected = area_beside / (area_beside + area_explained) if area_beside else 0.0
-    return Overlap(found / (expected + beside), found / expected, unexpected)
+    return Overlap(found / (expected + unexpected_px), found / expected, unexpected)
 
 
 def _strongest(response: NDArray[np.float32], distance: float) -> NDArray[np.float32]:
-    """The largest response (H, W) within `distance` of each pixel."""
+    """Return the largest response (H, W) within `distance` of each pixel."""
     size = 2 * round(distance) + 1
     around = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
     return np.asarray(cv2.dilate(response, around), dtype=np.float32)
@@ -70,18 +68,19 @@ def _rounded(pixels: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
 
 
 def _pitch_area(pitch: Field, camera: Camera) -> NDArray[np.uint8]:
-    """1 inside the pitch and `AROUND_PITCH_M` around it, at a sixteenth of the picture's detail."""
+    """Return 1 inside the field and a metre around it, at a sixteenth of the picture's detail."""
     coarse = camera.intrinsics.scaled(1 / 16)
     width, height = coarse.size
     x, y = np.meshgrid(np.arange(width), np.arange(height))
     rays = Camera(camera.id, coarse, camera.pose).rays(np.stack([x, y], axis=-1))
+    around_pitch_m = 1.0
     with np.errstate(divide="ignore", invalid="ignore"):
         distance = -camera.pose.position[2] / rays[..., 2]
         ground = camera.pose.position[:2] + distance[..., None] * rays[..., :2]
         on_pitch = (
             (distance > 0)
-            & (np.abs(ground[..., 0]) < pitch.length / 2 + AROUND_PITCH_M)
-            & (np.abs(ground[..., 1]) < pitch.width / 2 + AROUND_PITCH_M)
+            & (np.abs(ground[..., 0]) < pitch.length / 2 + around_pitch_m)
+            & (np.abs(ground[..., 1]) < pitch.width / 2 + around_pitch_m)
         )
     full = cv2.resize(on_pitch.astype(np.uint8), camera.intrinsics.size, interpolation=cv2.INTER_NEAREST)
     return np.asarray(full, dtype=np.uint8)

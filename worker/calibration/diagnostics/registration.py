@@ -1,4 +1,4 @@
-"""How far apart two cameras put the same markings: the paper's stitch error, measured without ground truth.
+"""Registration of two cameras by their responses: the paper's stitch error, measured without ground truth.
 
 The line responses of both cameras are laid onto the pitch (bird's-eye) and registered: a coarse search that bridges
 metres, then Gauss-Newton, finer and finer, on small turns and moves of both cameras that bring their markings onto each
@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from worker.calibration.geometry.camera import Array, Camera
-from worker.calibration.geometry.derivatives import ground_slopes
+from worker.calibration.geometry.derivatives import ground_jacobian
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.ground_view import Mask, ground_grid, ground_view
 
@@ -30,19 +30,13 @@ Segmented = tuple[Camera, Response]
 
 PIXEL_M = 0.1
 
-COARSE_STEP_M, COARSE_HALF_M, COARSE_BLUR_M = 0.2, 18.0, 0.4
-# How far apart two views may be to be found.
-REACH_M = 8.0
-# Shifts that leave less than this part of the common region are not judged.
-LEAST_COMMON = 0.3
-# Among shifts that explain the views alike (along a lone halfway line) the smallest is taken.
-SHIFT_PENALTY = 0.05
-# Views that are nearer than this where they should be, and so alike there, need no other guess.
-NEAR_M, ALIKE = 0.5, 0.7
+COARSE_STEP_M, COARSE_HALF_M = 0.2, 18.0
+# Displacement below which two views are near each other.
+NEAR_M = 0.5
 
 # Sampled finely, so that no edge of a line falls between two samples; once blurred, fewer will do.
 FINE_STEP_M, FINE_HALF_M = 0.05, 12.0
-# What is expected of a camera that is out of place, rad and m: the paper's Start errors.
+# Expected error of a camera that is out of place, rad and m: the paper's Start errors.
 EXPECTED = np.array([0.02, 0.02, 0.02, 0.16, 0.16, 0.16])
 # Blur in metres, every which sample (half a blur apart), and the part of what is expected that is expected at least in
 # each step. Coarse to fine; the last blur is about what a far camera smears: with less, the smear of two cameras that
@@ -50,33 +44,20 @@ EXPECTED = np.array([0.02, 0.02, 0.02, 0.16, 0.16, 0.16])
 # at the centre are not suspected of turns and moves that happen to cancel there.
 FINE_STAGES = ((0.8, 8, (1.0,)), (0.4, 4, (0.3,)), (0.2, 2, (0.1, 0.01)))
 FINEST_STRIDE = min(stride for _, stride, _ in FINE_STAGES)
-# Rounds end when one moves the views by less than this part of the blur, and after so many at the latest.
-SETTLED, MOST_ROUNDS = 0.002, 5
-# A difference of this part of a line's response counts as half an outlier.
-OUTLIER = 0.5
-# Grass, where neither view shows more than this, is left out.
-LEAST_RESPONSE = 0.05
-# Responses differ by this much through sampling alone.
-SAMPLING_NOISE = 0.005
 # A direction in which the markings leave the displacement looser than this is one along which they can slide.
 LOOSE_M = 0.1
 
-# Below these the views show nothing in common.
+# With less line on top of each other the views show nothing in common.
 LEAST_SUPPORT_M = 4.0
-LEAST_CORRELATION = 0.3
-# As much line across a direction holds the views in it.
-HOLDING_M = 8.0
-# What a metre of line is expected to say about where it is.
-EXPECTED_NOISE_M = 0.05
 
 
 @dataclass(frozen=True)
 class Registration:
-    """The second camera's markings relative to the first's: `dx_px`, `dy_px` along the world's axes, pixels of 10 cm.
+    """Displacement `dx_px`, `dy_px` of the second camera's markings, world's axes, pixels of 10 cm.
 
     Where the common markings are all parallel, only the displacement across them. `support`: metres of marking that
     both views show on top of each other once registered. `pair`: the ids of the cameras. Measured `at` a point (2,) of
-    the pitch, in the directions `told` (2, 1 or 2).
+    the pitch, in the `directions` (2, 1 or 2).
     """
 
     dx_px: float
@@ -84,16 +65,16 @@ class Registration:
     support: float
     pair: tuple[str, str]
     at: Array
-    told: Array
+    directions: Array
 
     @property
     def error_px(self) -> float:
-        """How far apart the two views are."""
+        """Distance between the two views."""
         return float(np.hypot(self.dx_px, self.dy_px))
 
 
 def pairs_in_common(pitch: Field, cameras: Sequence[Camera]) -> list[tuple[Camera, Camera]]:
-    """The pairs of cameras that, by their poses, see enough of the same markings to be compared."""
+    """Return the pairs of cameras that, by their poses, see enough of the same markings to be compared."""
     return [
         (first, second)
         for first, second in combinations(cameras, 2)
@@ -103,7 +84,7 @@ def pairs_in_common(pitch: Field, cameras: Sequence[Camera]) -> list[tuple[Camer
 
 
 def shares_plenty(pitch: Field, first: Camera, second: Camera) -> bool:
-    """Whether two cameras, by their poses, see so many of the same markings that their views have to register."""
+    """True if two cameras, by their poses, see so many of the same markings that their views have to register."""
     centre = reference_point(pitch, first, second)
     return centre is not None and directions_in_common(pitch, first, second, centre) == 2
 
@@ -120,32 +101,32 @@ def register_pair(
     if centre is None:
         return None
     segmented = ((first, first_response), (second, second_response))
-    held = directions_in_common(pitch, first, second, centre)
-    best = _best_fit(pitch, segmented, centre, held)
-    if best is None or best.support < LEAST_SUPPORT_M or best.correlation < LEAST_CORRELATION:
+    expected_directions = directions_in_common(pitch, first, second, centre)
+    best = _best_fit(pitch, segmented, centre, expected_directions)
+    if best is None or best.support < LEAST_SUPPORT_M or best.correlation < 0.3:
         return None
     # A halfway line fits itself wherever it is slid to. Where a circle should have held it, that is no registration.
-    if best.held < held:
+    if best.held < expected_directions:
         return None
     dx, dy = best.displacement / PIXEL_M
-    return Registration(float(dx), float(dy), best.support, (first.id, second.id), best.middle, best.told)
+    return Registration(float(dx), float(dy), best.support, (first.id, second.id), best.middle, best.directions)
 
 
 def pair_error_px(
     pitch: Field, registration: Registration, found: tuple[Camera, Camera], others: tuple[Camera, Camera]
 ) -> float:
-    """How far apart, in pixels of 10 cm, two cameras would put the same markings by `others`' poses and lenses.
+    """Return the distance (pixels of 10 cm) between two cameras' places of the same markings as `others`.
 
     They were registered as they are `found`: what they see at the registered point is put elsewhere by other poses.
     """
     point = pitch.lift(registration.at)
     first, second = (_put(pitch, other, one.project(point)) for one, other in zip(found, others, strict=True))
-    moved = registration.told @ registration.told.T @ (second - first)[:2] / PIXEL_M
+    moved = registration.directions @ registration.directions.T @ (second - first)[:2] / PIXEL_M
     return float(np.hypot(registration.dx_px + moved[0], registration.dy_px + moved[1]))
 
 
 def _put(pitch: Field, camera: Camera, pixel: Array) -> Array:
-    """The point (3,) of the pitch that a camera sees in a pixel (2,)."""
+    """Return the point (3,) of the field that a camera sees in a pixel (2,)."""
     ray = camera.rays(pixel)
     height = np.zeros(())
     # The roof is so flat that a few steps from the height last found reach it.
@@ -156,7 +137,7 @@ def _put(pitch: Field, camera: Camera, pixel: Array) -> Array:
 
 
 def reference_point(pitch: Field, first: Camera, second: Camera) -> Array | None:
-    """The pitch centre (2,) if both cameras see it, else the middle of the common markings around the nearest one."""
+    """Return the field's centre (2,) if both see it, else the middle of the common markings nearest to it."""
     points = np.concatenate([pitch.lift(np.zeros((1, 2))), pitch.line_points(0.5).position])
     seen = np.all([camera.sees(camera.project(points)) for camera in (first, second)], axis=0)
     if not seen.any():
@@ -169,7 +150,7 @@ def reference_point(pitch: Field, first: Camera, second: Camera) -> Array | None
 
 
 def directions_in_common(pitch: Field, first: Camera, second: Camera, centre: Array) -> int:
-    """In how many directions, 0 to 2, the markings that both cameras should see around a point (2,) can hold a view.
+    """Return in how many directions, 0 to 2, the common markings around a point (2,) should hold a view.
 
     There must be enough line across a direction, and it must not be so far aside that a turn and a move of a camera
     which cancel there still shift the point: a court whose centre has no circle is held along its centre line by
@@ -180,9 +161,11 @@ def directions_in_common(pitch: Field, first: Camera, second: Camera, centre: Ar
     near = np.abs(lines.position[:, :2] - centre).max(axis=1) < FINE_HALF_M
     common = lines[seen & near]
     across = common.normal[:, :2]
-    enough = np.linalg.eigvalsh(lines.spacing * across.T @ across) > HOLDING_M
-    slope = (across[:, :, None] * forms_of_both(first, second, common.position)).sum(axis=1)
-    information = lines.spacing / EXPECTED_NOISE_M**2 * slope.T @ slope
+    # Length of line across a direction that holds the views in it.
+    enough = np.linalg.eigvalsh(lines.spacing * across.T @ across) > 8.0
+    jacobian = (across[:, :, None] * forms_of_both(first, second, common.position)).sum(axis=1)
+    # A metre of line is measured to 5 cm.
+    information = lines.spacing / 0.05**2 * jacobian.T @ jacobian
     at_centre = forms_of_both(first, second, pitch.lift(centre))
     covariance = at_centre @ np.linalg.inv(information + np.eye(len(information))) @ at_centre.T
     held = np.linalg.eigvalsh(covariance) < LOOSE_M**2
@@ -191,41 +174,46 @@ def directions_in_common(pitch: Field, first: Camera, second: Camera, centre: Ar
 
 @dataclass(frozen=True)
 class _Fit:
-    """`displacement` (2,) m in the `middle` (2,) in the directions `told` (2, n).
+    """Fit of two views: `displacement` (2,) m in the `middle` (2,) in the `directions` (2, n).
 
     `support`: metres of marking in common; `correlation`: how alike they are.
     """
 
     middle: Array
     displacement: Array
-    told: Array
+    directions: Array
     support: float
     correlation: float
 
     @property
     def held(self) -> int:
-        """In how many directions the markings hold the views."""
-        return self.told.shape[1]
+        """Number of directions in which the markings hold the views."""
+        return self.directions.shape[1]
 
 
-def _best_fit(pitch: Field, segmented: Sequence[Segmented], centre: Array, held: int) -> _Fit | None:
-    """Where the views should be alike, or, unless they are there, where they look most alike."""
-    expected = _fit(pitch, segmented, centre, np.zeros(2), held)
-    if expected.correlation > ALIKE and expected.held == held and np.hypot(*expected.displacement) < NEAR_M:
+def _best_fit(pitch: Field, segmented: Sequence[Segmented], centre: Array, expected_directions: int) -> _Fit | None:
+    """Return the fit where the views should be alike, or, unless they are there, where they look most alike."""
+    expected = _fit(pitch, segmented, centre, np.zeros(2), expected_directions)
+    # Views that are near where they should be, and so alike there, need no other guess.
+    if (
+        expected.correlation > 0.7
+        and expected.held == expected_directions
+        and np.hypot(*expected.displacement) < NEAR_M
+    ):
         return expected
     guesses = _guesses(pitch, segmented, centre)
-    fits = [expected, *(_fit(pitch, segmented, middle, shift, held) for middle, shift in guesses)]
+    fits = [expected, *(_fit(pitch, segmented, middle, shift, expected_directions) for middle, shift in guesses)]
     return max(fits, key=lambda fit: fit.support * fit.correlation)
 
 
 def _guesses(pitch: Field, segmented: Sequence[Segmented], centre: Array) -> list[tuple[Array, Array]]:
-    """Where to measure (2,), and how far apart (2,) the views look there; nothing where that is next to none."""
+    """Return a place to measure (2,) and the views' apparent displacement (2,) there; nothing if that is small."""
     grid = _square(centre, COARSE_HALF_M, COARSE_STEP_M)
     views = [ground_view(pitch, camera, response, grid) for camera, response in segmented]
     shift = _coarse_shift(views[0], views[1], pitch.line_width)
     if shift is None:
         return []
-    # Where the cameras put the markings of the centre, roughly: the displacement is measured there and not beside it.
+    # Rough place of the markings of the centre by the cameras: the displacement is measured there and not beside it.
     template = _template(pitch, centre)
     placed = [put for put in (_coarse_shift(template, view, pitch.line_width) for view in views) if put is not None]
     middle = centre + np.mean(placed or [np.zeros(2)], axis=0)
@@ -233,7 +221,7 @@ def _guesses(pitch: Field, segmented: Sequence[Segmented], centre: Array) -> lis
 
 
 def _fit(pitch: Field, segmented: Sequence[Segmented], middle: Array, shift: Array, held: int) -> _Fit:
-    """The displacement of the views in the `middle`, from a guess that is right to a metre or so.
+    """Fit the displacement of the views in the `middle`, from a guess that is right to a metre or so.
 
     In at most as many directions as the markings should hold: along a short arc of a circle, which tells a little of
     both, the second is mostly noise.
@@ -250,10 +238,10 @@ def _fit(pitch: Field, segmented: Sequence[Segmented], middle: Array, shift: Arr
         forms.append(_forms(camera, surface[::FINEST_STRIDE, ::FINEST_STRIDE]))
     fine = _fine_moves(views[0], views[1], np.concatenate(forms, axis=-1), at_middle, start, pitch.line_width)
 
-    variance, directions = np.linalg.eigh(at_middle @ fine.covariance @ at_middle.T)
-    told = directions[:, variance < LOOSE_M**2][:, :held]
-    displacement = told @ told.T @ at_middle @ fine.moves
-    return _Fit(middle, displacement, told, fine.common_area_m2 / pitch.line_width, fine.correlation)
+    variance, axes = np.linalg.eigh(at_middle @ fine.covariance @ at_middle.T)
+    directions = axes[:, variance < LOOSE_M**2][:, :held]
+    displacement = directions @ directions.T @ at_middle @ fine.moves
+    return _Fit(middle, displacement, directions, fine.common_area_m2 / pitch.line_width, fine.correlation)
 
 
 def _square(middle: Array, half_m: float, step_m: float) -> Array:
@@ -262,7 +250,7 @@ def _square(middle: Array, half_m: float, step_m: float) -> Array:
 
 
 def _template(pitch: Field, centre: Array) -> BirdsEye:
-    """The markings as they should be, on the coarse grid."""
+    """Return the markings as they should be, on the coarse grid."""
     points = pitch.line_points(COARSE_STEP_M / 4)
     count = round(COARSE_HALF_M / COARSE_STEP_M)
     edges = COARSE_STEP_M * (np.arange(-count, count + 2) - 0.5)
@@ -273,10 +261,12 @@ def _template(pitch: Field, centre: Array) -> BirdsEye:
 
 
 def _coarse_shift(first: BirdsEye, second: BirdsEye, line_width: float) -> Array | None:
-    """Shift (2,) in metres, world axes, of the second view relative to the first with the highest correlation."""
+    """Return the shift (2,), m, of the second view relative to the first with the highest correlation."""
     a_seen, b_seen = first[1], second[1]
-    a, b = (_smooth(view, COARSE_BLUR_M, COARSE_STEP_M, line_width) * view[1] for view in (first, second))
-    reach = round(REACH_M / COARSE_STEP_M)
+    a, b = (_smooth(view, 0.4, COARSE_STEP_M, line_width) * view[1] for view in (first, second))
+    # Largest displacement of two views that is found.
+    reach_m = 8.0
+    reach = round(reach_m / COARSE_STEP_M)
     # Over what both see at each shift (masked normalised correlation after Padfield, 2012).
     plane = cv2.getOptimalDFTSize(2 * a.shape[0])
     fa, fb, fa2, fb2, fas, fbs = (np.fft.rfft2(p, (plane, plane)) for p in (a, b, a * a, b * b, a_seen, b_seen))
@@ -290,30 +280,32 @@ def _coarse_shift(first: BirdsEye, second: BirdsEye, line_width: float) -> Array
     var_a = correlate(fa2, fbs) - sum_a**2 / common
     var_b = correlate(fas, fb2) - sum_b**2 / common
     covariance = correlate(fa, fb) - sum_a * sum_b / common
-    judged = (common > LEAST_COMMON * common.max()) & (np.minimum(var_a, var_b) > 1e-3)
+    # Shifts that leave less than this part of the common region are not judged.
+    judged = (common > 0.3 * common.max()) & (np.minimum(var_a, var_b) > 1e-3)
     if not judged.any():
         return None
     correlation = covariance[judged] / np.sqrt(var_a[judged] * var_b[judged])
     shifts = ground_grid(reach, reach, COARSE_STEP_M)[judged]
-    best = np.argmax(correlation - SHIFT_PENALTY * np.linalg.norm(shifts, axis=1) / REACH_M)
+    # Among shifts that explain the views alike (along a lone halfway line) the smallest is taken.
+    best = np.argmax(correlation - 0.05 * np.linalg.norm(shifts, axis=1) / reach_m)
     return np.asarray(shifts[best])
 
 
 def _forms(camera: Camera, points: Array) -> Array:
-    """How points (..., 3) of the pitch move, (..., 2, 6) metres, in the view of a camera that believes a wrong pose.
+    """Jacobian (..., 2, 6) of points (..., 3) of the field in a camera's view, metres per expected error of its pose.
 
     One column per expected turn about each axis of the camera and move along each axis of the world.
     """
-    return ground_slopes(camera, points) * EXPECTED
+    return ground_jacobian(camera, points) * EXPECTED
 
 
 def forms_of_both(first: Camera, second: Camera, points: Array) -> Array:
-    """How points (..., 3) of the pitch move in the second view relative to the first, (..., 2, 12)."""
+    """Jacobian (..., 2, 12) of points (..., 3) of the field in the second view relative to the first, see `_forms`."""
     return np.concatenate([-_forms(first, points), _forms(second, points)], axis=-1)
 
 
 def _displacement(camera: Camera, points: Array, moves: Array) -> Array:
-    """How points (..., 3) move, (..., 2) metres, by given `moves` (6,): `_forms` times those, without the forms."""
+    """Return the displacement (..., 2) m of points (..., 3) by `moves` (6,): `_forms` times those."""
     change = EXPECTED * moves
     ray = points - camera.pose.position
     carried = change[3:] + np.cross(ray, camera.pose.matrix.T @ change[:3])
@@ -322,7 +314,7 @@ def _displacement(camera: Camera, points: Array, moves: Array) -> Array:
 
 @dataclass(frozen=True)
 class _Fine:
-    """`moves` (12,) of both cameras, in expected turns and moves, and what then coincides.
+    """Moves (12,) of both cameras, in expected turns and moves, and the overlap of the views after them.
 
     `covariance` (12, 12): how loose the markings leave the moves of cameras of which no more is known than is expected.
     """
@@ -336,7 +328,7 @@ class _Fine:
 def _fine_moves(
     first: BirdsEye, second: BirdsEye, forms: Array, at_middle: Array, start: Array, line_width: float
 ) -> _Fine:
-    """Gauss-Newton on the moves (12,) of both cameras.
+    """Fit the moves (12,) of both cameras by Gauss-Newton.
 
     `forms` (n, n, 2, 12): what they do to every `FINEST_STRIDE`th point of each view; `at_middle` (2, 12): what they do
     to the displacement in the middle. The views are sampled where `start` puts them.
@@ -350,14 +342,15 @@ def _fine_moves(
         every = stride // FINEST_STRIDE
         coarser = np.ascontiguousarray(forms[::every, ::every])
         for least in leasts:
-            for _ in range(MOST_ROUNDS):
+            for _ in range(5):
                 warped, valid = _moved(smooth, seen, coarser, moves - start, stride)
-                pull, information = _normal_equations(warped[0], warped[1], valid, coarser, step_m, blur)
+                right_side, information = _normal_equations(warped[0], warped[1], valid, coarser, step_m, blur)
                 found = at_middle @ moves
                 prior = 1 / max(float(found @ expected @ found), least**2)
-                step = np.linalg.solve(information + prior * np.eye(len(moves)), pull - prior * moves)
+                step = np.linalg.solve(information + prior * np.eye(len(moves)), right_side - prior * moves)
                 moves = moves + step
-                if np.hypot(*(at_middle @ step)) < SETTLED * blur:
+                # Rounds end when one moves the views by less than this part of the blur.
+                if np.hypot(*(at_middle @ step)) < 0.002 * blur:
                     break
     covariance = np.asarray(np.linalg.inv(information + np.eye(len(moves))), float)
     common = np.minimum(*warped)[valid].sum(dtype=float) * step_m**2
@@ -367,8 +360,8 @@ def _fine_moves(
 def _moved(
     views: Sequence[Response], seen: Sequence[Response], forms: Array, moves: Array, stride: int
 ) -> tuple[list[Response], Mask]:
-    """Both views at every `stride`th point after some moves (12,) of their cameras, and where both are seen."""
-    # As plain matrices, which multiply ten times faster.
+    """Return both views at every `stride`th point after moves (12,) of the cameras, and the mask that both see."""
+    # Plain matrices multiply ten times faster.
     offsets = [
         (forms[..., its].reshape(-1, 6) @ moves[its]).reshape(forms.shape[:3]) for its in (slice(6), slice(6, 12))
     ]
@@ -380,26 +373,29 @@ def _moved(
 def _normal_equations(
     a: Response, b: Response, valid: Mask, forms: Array, step_m: float, blur: float
 ) -> tuple[Array, Array]:
-    """What the difference of two views says about the moves: pull (12,) and information (12, 12)."""
-    active = valid & (a + b > LEAST_RESPONSE)
+    """Return gradient (12,) and information (12, 12) of the moves by the difference of two views."""
+    # Grass, where neither view shows more than this, is left out.
+    active = valid & (a + b > 0.05)
     down, right = np.gradient(a + b)
     gradient = np.stack([right[active], -down[active]], axis=-1).astype(float) / (2 * step_m)
-    slope = np.einsum("md,mdj->mj", gradient, forms[active])
-    slope[:, :6] *= -1
+    jacobian = np.einsum("md,mdj->mj", gradient, forms[active])
+    jacobian[:, :6] *= -1
     residual = (a - b)[active].astype(float)
-    # What only one view has, players for one, must not pull (Geman and McClure's weight); lines still apart must.
-    scale = OUTLIER * float(np.quantile(np.maximum(a, b)[active], 0.9)) if len(residual) else 1.0
+    # Features of one view only, such as players, must not pull (Geman and McClure's weight); lines still apart must. A
+    # difference of half a line's response counts as half an outlier.
+    scale = 0.5 * float(np.quantile(np.maximum(a, b)[active], 0.9)) if len(residual) else 1.0
     weight = 1 / (1 + (residual / scale) ** 2) ** 2
     # The blur makes neighbours alike: this many pixels count as one.
     alike = 4 * np.pi * (blur / step_m) ** 2
-    noise = SAMPLING_NOISE**2 + (weight * residual**2).sum() / max(weight.sum(), 1.0)
-    weighted = slope * (weight / (noise * alike))[:, None]
+    # Responses differ by this much through sampling alone.
+    noise = 0.005**2 + (weight * residual**2).sum() / max(weight.sum(), 1.0)
+    weighted = jacobian * (weight / (noise * alike))[:, None]
     # einsum rather than matrix products, so that the number of threads cannot change a digit.
-    return np.einsum("mi,m->i", weighted, residual), np.einsum("mi,mj->ij", weighted, slope)
+    return np.einsum("mi,m->i", weighted, residual), np.einsum("mi,mj->ij", weighted, jacobian)
 
 
 def _smooth(view: BirdsEye, blur_m: float, step_m: float, line_width: float) -> Response:
-    """A view blurred over what the camera sees, and no brighter than a line of the width then is.
+    """Return a view blurred over what the camera sees, and no brighter than a line of the width then is.
 
     Lines stay as they are; players and lettering, wider than a line, cannot outweigh them.
     """
@@ -411,7 +407,7 @@ def _smooth(view: BirdsEye, blur_m: float, step_m: float, line_width: float) -> 
 
 
 def _warp(view: Response, offset: Array, stride: int) -> Response:
-    """A view on the fine grid, sampled at every `stride`th point moved by `offset` (n, n, 2) metres."""
+    """Return a view on the fine grid, sampled at every `stride`th point moved by `offset` (n, n, 2) metres."""
     rows, columns = stride * np.indices(offset.shape[:2], np.float32)
     move = (offset / FINE_STEP_M).astype(np.float32)
     sampled = cv2.remap(view, columns + move[..., 0], rows - move[..., 1], cv2.INTER_LINEAR, borderValue=0.0)
@@ -419,7 +415,7 @@ def _warp(view: Response, offset: Array, stride: int) -> Response:
 
 
 def _correlation(a: Response, b: Response) -> float:
-    """Normalised correlation of two sets of values, 0 where there is nothing to correlate."""
+    """Return the normalised correlation of two sets of values, 0 where there is nothing to correlate."""
     if not a.size:
         return 0.0
     a, b = a - a.mean(dtype=float), b - b.mean(dtype=float)

@@ -1,1 +1,1 @@
-"""The measures of a pitch, from the lines that its cameras see."""
+"""Fit of a field's measures to the lines that its cameras see."""

@@ -1,4 +1,4 @@
-"""The measures of a pitch from the lines that cameras see: length, width, and how its ridge runs.
+"""Fit of a field's length, width and ridge to the lines that cameras see.
 
 Poses, measures and the swells of the ground are found together, as in every calibration. What lines, lenses and ground
 leave open is said as a sigma, and a measure that they leave about as open as it was is not touched.
@@ -12,26 +12,21 @@ from typing import Literal, cast
 
 import numpy as np
 
-from worker.calibration.calibrate import judge_together
 from worker.calibration.field_fit.ridge_length import TriedRidges, try_ridges
 from worker.calibration.geometry.camera import Camera, Frame
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.parameters import FieldMeasure, LensParameter, Parameter, free_field
+from worker.calibration.joint_verdict import judge_together
 from worker.calibration.observe import FrameObserver
+from worker.calibration.problem import Problem
 from worker.calibration.records import EngineResult, Options, Progress, ProgressReporter, Segment
 from worker.calibration.refinement.refine import SEARCH_PX, Observations, refine
 from worker.calibration.refinement.uncertainty import ParameterUncertainty, RefinedPoses
-from worker.calibration.solve import Problem, judge_each
+from worker.calibration.steps import judge_each
 from worker.calibration.wide_path import search_and_refine
 
-FIRST_SEARCH_PX = (40.0, 24.0)
-"""A pitch whose measures are guesses has its lines farther from where they are expected than one that is known."""
 TOLD = 0.25
-"""A measure is known when the lines leave this part of what was open, or less."""
-UNTOUCHED = 0.9
-"""Where they leave this part, no line that it moves was measured."""
-SURE_DIP = 2.0
-"""A ridge that is lower than the corners by this many sigma is no measurement of a flat pitch."""
+"""Largest part of the prior sigma that the lines leave of a known measure."""
 QUANTITIES = {
     "length_m": "the pitch's length",
     "width_m": "the pitch's width",
@@ -48,7 +43,7 @@ MeasureName = Literal["length_m", "width_m", "ridge_height_m", "ridge_length_m"]
 
 @dataclass(frozen=True)
 class Measure:
-    """A measure of the pitch, metres: as it was `given` and as the lines have it (`value`), with `sigma`.
+    """Measure of the field, metres: as it was `given` and as the lines have it (`value`), with `sigma`.
 
     `open_m`: a standard deviation of what it might have been before. `known`: whether the lines tell it; if not,
     `value` is worth nothing, the fitted pitch keeps what was given, and `detail` says why.
@@ -65,7 +60,7 @@ class Measure:
 
 @dataclass(frozen=True)
 class FieldFit(EngineResult):
-    """A pitch with the measures that the lines tell, and the cameras as they stand around it."""
+    """Field with the measures that the lines tell, and the cameras around it."""
 
     measures: Sequence[Measure]
 
@@ -111,9 +106,10 @@ def fit_field(
 def fit_measures(
     pitch: Field, cameras: Sequence[Camera], observations: Observations, stitch_weight: float
 ) -> tuple[RefinedPoses, list[Measure]]:
-    """The finish on the pitch with those measures that the lines tell; and what they tell of every measure."""
+    """Refine on the field with those measures that the lines tell; return the poses and every measure."""
     free = free_field(pitch)
-    everything = refine(pitch, cameras, observations, stitch_weight, free, (*FIRST_SEARCH_PX, *SEARCH_PX))
+    # A field whose measures are guesses has its lines farther from where they are expected.
+    everything = refine(pitch, cameras, observations, stitch_weight, free, (40.0, 24.0, *SEARCH_PX))
     tried = try_ridges(everything, free, observations)
     measures = [
         _measure(pitch, everything.pitch, parameter, found, tried, cameras)
@@ -122,15 +118,15 @@ def fit_measures(
     ridge = _ridge_length(pitch, tried)
     known, still_free = _with_known(pitch, everything.pitch, free, measures, ridge)
     final = refine(known, everything.cameras, observations, stitch_weight, still_free)
-    told = [
+    updated = [
         replace(measure, value=parameter.read(final.pitch)) if measure.known else measure
         for measure, parameter in zip(measures, free, strict=True)
     ]
-    return final, [*told, ridge]
+    return final, [*updated, ridge]
 
 
 def leave_measures(pitch: Field) -> list[Measure]:
-    """The measures as they are, where not all frames can be used to find them."""
+    """Return the measures as they are, where not all frames can be used to find them."""
     given = [(p.name, p.read(pitch), p.expected) for p in free_field(pitch)]
     given.append(("ridge_length_m", pitch.ridge_length, _open_ridge_length(pitch)))
     return [
@@ -148,15 +144,15 @@ def _measure(
     cameras: Sequence[Camera],
 ) -> Measure:
     sigma = float(np.hypot(found.sigma, tried.spread(parameter.read)))
-    left = sigma / parameter.expected
-    known = left <= TOLD
+    remaining = sigma / parameter.expected
+    known = remaining <= TOLD
     detail = ""
     if not given.template.size and parameter.name in ("length_m", "width_m"):
         detail = "markings of your own lie where their coordinates say, whatever the measure"
-    elif left > UNTOUCHED:
+    elif remaining > 0.9:
         detail = "no line that depends on it is in view"
     elif not known:
-        detail = f"the lines in view leave {left:.0%} of what was open"
+        detail = f"the lines in view leave {remaining:.0%} of what was open"
         if found.most_correlated is not None:
             other, correlation = found.most_correlated
             detail += f"; it cannot be told apart from {_named(other, cameras)} (correlation {correlation:+.2f})"
@@ -173,18 +169,18 @@ def _ridge_length(given: Field, tried: TriedRidges) -> Measure:
 
 
 def _open_ridge_length(pitch: Field) -> float:
-    """One standard deviation of a length between none and that of the whole pitch."""
+    """Return one standard deviation of a length between none and that of the whole field."""
     return float(pitch.length / np.sqrt(12))
 
 
 def _with_known(
     given: Field, fitted: Field, free: Sequence[FieldMeasure], measures: Sequence[Measure], ridge: Measure
 ) -> tuple[Field, list[FieldMeasure]]:
-    """The given pitch with the measures that are known, and which of them are found along with poses."""
+    """Return the given field with the known measures, and those of them that are found along with poses."""
     pitch, still_free = given, []
     for parameter, measure in zip(free, measures, strict=True):
-        # What lies below the corners by no more than chance is a flat pitch.
-        flat = parameter.name == "ridge_height_m" and -SURE_DIP * measure.sigma < measure.value <= 0
+        # A ridge below the corners by no more than chance is a flat field.
+        flat = parameter.name == "ridge_height_m" and -2.0 * measure.sigma < measure.value <= 0
         if flat:
             pitch = pitch.flat()
         elif measure.known:
@@ -201,7 +197,7 @@ def _named(parameter: Parameter, cameras: Sequence[Camera]) -> str:
 
 
 def _implausible(pitch: Field) -> str | None:
-    """Why a fitted pitch cannot be one."""
+    """Return why a fitted field cannot be one, None if it can."""
     for what, value in (("length", pitch.length), ("width", pitch.width)):
         extent = pitch.template.size.get(what)
         if extent is not None and not extent.least <= value <= extent.most:

@@ -1,4 +1,4 @@
-"""How long a ridge may be: each length tried, because it moves the lines in kinks that no tangent foretells.
+"""Length of a ridge, by trying each: it moves the lines in kinks that no tangent predicts.
 
 A length is believed by how well the lines fit with it once poses, measures and the swells of the ground are found anew.
 """
@@ -23,15 +23,11 @@ from worker.calibration.refinement.unknowns import Unknowns
 from worker.calibration.robust import TUKEY, robust_scale, tukey_loss, tukey_weights
 
 SPACING_M = 10.0
-STEPS = 4
-"""Per length, for everything that is found with it."""
-ALIKE = 4.0
-"""Lengths whose costs are this near to the least fit alike: two standard deviations."""
 
 
 @dataclass(frozen=True)
 class TriedRidge:
-    """A pitch with a ridge of some length, everything else found for it; `cost`: -2 log likelihood, from any zero."""
+    """Field with a ridge of some length, everything else found for it; `cost`: -2 log likelihood, from any zero."""
 
     pitch: Field
     cost: float
@@ -39,25 +35,25 @@ class TriedRidge:
 
 @dataclass(frozen=True)
 class TriedRidges:
-    """`held`: the pitch with the length that it came with; `tried`: every `SPACING_M` from none to the whole pitch."""
+    """Ridges of all lengths, `tried` every `SPACING_M`. `held`: the field with its own length."""
 
     held: Field
     tried: Sequence[TriedRidge]
 
     @property
     def lengths(self) -> Array:
-        """Of the ridges tried (T,)."""
+        """Lengths of the ridges tried (T,)."""
         return np.array([ridge.pitch.ridge_length for ridge in self.tried])
 
     @property
     def credence(self) -> Array:
-        """How probable each of the tried lengths is (T,), if all were before."""
+        """Posterior probability of each of the tried lengths (T,), with a flat prior."""
         likelihood = np.exp((self._costs.min() - self._costs) / 2)
         return np.asarray(likelihood / likelihood.sum())
 
     @property
     def best(self) -> float:
-        """The expected length."""
+        """Expected length."""
         return float(self.credence @ self.lengths)
 
     @property
@@ -68,12 +64,13 @@ class TriedRidges:
 
     @property
     def alike(self) -> tuple[float, float]:
-        """The shortest and the longest that fit about as well as the best."""
-        lengths = self.lengths[self._costs < self._costs.min() + ALIKE]
+        """Shortest and longest ridge that fit about as well as the best."""
+        # Two standard deviations.
+        lengths = self.lengths[self._costs < self._costs.min() + 4.0]
         return float(lengths.min()), float(lengths.max())
 
     def spread(self, read: Callable[[Field], float]) -> float:
-        """How far (rms) another measure is off because the ridge is not as long as it was held."""
+        """Return the rms error of another measure because the ridge is not as long as it was held."""
         off = np.array([read(ridge.pitch) for ridge in self.tried]) - read(self.held)
         return float(np.sqrt(self.credence @ off**2))
 
@@ -83,20 +80,20 @@ class TriedRidges:
 
 
 def try_ridges(base: RefinedPoses, free: Sequence[Parameter], observations: Observations) -> TriedRidges:
-    """Ridges of all lengths on the lines that a finish left; `free`: what is found anew for each, with the poses."""
+    """Try ridges of all lengths on the lines of a refinement; `free`: parameters found anew for each."""
     lines = base.pitch.line_points()
     measured = observations.reader().measure(lines, base.cameras, EVALUATION_SEARCH_PX)
     unknowns = Unknowns(len(base.cameras), free, Ground.under(lines))
-    held, rows = _fitted(base.pitch, base.cameras, measured, unknowns)
+    base_fit, rows = _fitted(base.pitch, base.cameras, measured, unknowns)
     scale = robust_scale(rows.value)
     together = _together(rows, scale)
     tried = []
     for length in np.arange(0.0, base.pitch.length, SPACING_M).tolist():
-        there, left = _fitted(base.pitch.with_ridge_length(length), base.cameras, measured, unknowns)
+        there, rows_there = _fitted(base.pitch.with_ridge_length(length), base.cameras, measured, unknowns)
         away = there.change_from(base.cameras)
-        loss = float(np.sum(tukey_loss(left.value, scale))) + float(away @ there.prior(unknowns) @ away)
+        loss = float(np.sum(tukey_loss(rows_there.value, scale))) + float(away @ there.prior(unknowns) @ away)
         tried.append(TriedRidge(there.pitch, loss / together))
-    return TriedRidges(held.pitch, tried)
+    return TriedRidges(base_fit.pitch, tried)
 
 
 def _fitted(
@@ -105,16 +102,16 @@ def _fitted(
     measured: Sequence[Measurements],
     unknowns: Unknowns,
 ) -> tuple[Estimate, WeightedRows]:
-    """Everything else found for a pitch, and what is left of the lines then."""
-    here = Estimate.at(pitch, cameras, unknowns)
-    for _ in range(STEPS):
-        unknowns = unknowns.around(here.pitch, here.lines)
-        here = gauss_newton_step(here, cameras, measured, unknowns, tukey_weights).to
-    return here, weigh_rows(here.rows(measured, unknowns), here.heights, unknowns, tukey_weights)
+    """Return the estimate of everything else for a field, and the weighted residuals of the lines there."""
+    estimate = Estimate.initial(pitch, cameras, unknowns)
+    for _ in range(4):
+        unknowns = unknowns.around(estimate.pitch, estimate.lines)
+        estimate = gauss_newton_step(estimate, cameras, measured, unknowns, tukey_weights).to
+    return estimate, weigh_rows(estimate.rows(measured, unknowns), estimate.heights, unknowns, tukey_weights)
 
 
 def _together(rows: WeightedRows, scale: float) -> float:
-    """As many residuals that neighbours on a line err alike count as one."""
+    """Return the number of residuals that neighbours on a line err alike and that count as one."""
     good = np.abs(rows.value) < TUKEY * scale
     sums = np.bincount(rows.points[rows.at[good]] // CLUSTER_POINTS, rows.value[good])
     return max(float(np.sum(sums**2) / np.sum(rows.value[good] ** 2)), 1.0)

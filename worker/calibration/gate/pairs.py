@@ -1,4 +1,4 @@
-"""What cameras say of each other: whether two of them put the same markings in the same place, and who is to blame."""
+"""Pairs of cameras: whether two of them put the same markings in the same place, and which one is wrong."""
 
 from __future__ import annotations
 
@@ -19,21 +19,18 @@ from worker.calibration.diagnostics.registration import (
     register_pair,
     shares_plenty,
 )
-from worker.calibration.gate.quality import Gate, Reason, Refusal
+from worker.calibration.gate.quality import GATE, Reason, Refusal
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.field import Field
-
-MOST = 0.6
-"""Of the line that two cameras share, that both see: they do see it."""
 
 
 @dataclass(frozen=True)
 class CameraResponse:
-    """A camera, the segmentation (H, W) of its frame in 0..1, and how much of the lines is seen where it puts them.
+    """Camera with the segmentation (H, W) of its frame in 0..1.
 
-    `evidence`: computes that, and is asked only where two cameras cannot be registered.
-    `response` None: the network has not looked at the frame in full, and the lines `measured` in it say how it lies
-    beside others.
+    `evidence`: computes the evidence for the lines, and is asked only where two cameras cannot be registered.
+    `response` None: the network has not looked at the frame in full, and the lines `measured` in it register it with
+    others.
     """
 
     camera: Camera
@@ -46,10 +43,10 @@ class CameraResponse:
 class Pair:
     """Two cameras, by their ids, that should show some of the same markings.
 
-    `error_px`: how far apart they put them, 1 px = 10 cm; None where their views cannot be brought together, and then
-    there is no `registration`. `plenty`: they share so much that this tells something; `confirmed`: they
-    register, or both see what they share where their poses put it. `shift_px`: what is so far apart, as pixels of the
-    frame that shows it larger.
+    `error_px`: distance between the places where they put them, 1 px = 10 cm; None where their views cannot be
+    registered, and then there is no `registration`. `plenty`: they share so much that this tells something;
+    `confirmed`: they register, or both see what they share where their poses put it. `shift_px`: that distance in
+    pixels of the frame that shows it larger.
     """
 
     first: str
@@ -62,28 +59,28 @@ class Pair:
 
     @property
     def cameras(self) -> tuple[str, str]:
-        """Both."""
+        """Ids of both cameras."""
         return self.first, self.second
 
-    def agrees(self, gate: Gate) -> bool:
+    def agrees(self) -> bool:
         """Return whether the two cameras confirm each other.
 
         Where far grass moves by less than a pixel of either frame, neither tells its place any better.
         """
-        is_near = self.error_px is not None and self.error_px <= gate.largest_stitch_error_px
-        return is_near or self.shift_px <= gate.largest_ground_sigma_px
+        is_near = self.error_px is not None and self.error_px <= GATE.largest_stitch_error_px
+        return is_near or self.shift_px <= GATE.largest_ground_sigma_px
 
     @property
     def missed(self) -> bool:
-        """Whether their views cannot be brought together though they should be."""
+        """True if the views should register and do not."""
         return self.error_px is None and self.plenty and not self.confirmed
 
-    def disagrees(self, gate: Gate) -> bool:
-        """Whether they contradict each other. Two that share too little to be compared do neither."""
-        return self.missed or (self.error_px is not None and not self.agrees(gate))
+    def disagrees(self) -> bool:
+        """True if the cameras contradict each other. Two that share too little to be compared do neither."""
+        return self.missed or (self.error_px is not None and not self.agrees())
 
-    def words(self, gate: Gate) -> str:
-        """What contradicts what, and what to do."""
+    def words(self) -> str:
+        """Return the contradiction in words, and what to do."""
         both = f"{self.first} and {self.second}"
         if self.error_px is None:
             return (
@@ -91,26 +88,26 @@ class Pair:
             )
         return (
             f"the cameras {both} do not fit each other: stitch error {self.error_px:.2f} px, at most "
-            f"{gate.largest_stitch_error_px} allowed, which is {self.shift_px:.1f} px of a frame, at most "
-            f"{gate.largest_ground_sigma_px} allowed; look at the preview, and check intrinsics and ridge"
+            f"{GATE.largest_stitch_error_px} allowed, which is {self.shift_px:.1f} px of a frame, at most "
+            f"{GATE.largest_ground_sigma_px} allowed; look at the preview, and check intrinsics and ridge"
         )
 
 
 @dataclass(frozen=True)
 class Contradiction:
-    """A pair of which at least one camera is wrong. `blamed`: which, or both where nothing tells."""
+    """Pair of which at least one camera is wrong. `blamed`: which, or both where nothing tells."""
 
     pair: Pair
     blamed: Sequence[str]
 
-    def words(self, gate: Gate) -> str:
-        """What contradicts what, naming who is to blame where it is one of them."""
+    def words(self) -> str:
+        """Return the contradiction in words, naming the camera to blame where it is one of them."""
         whose = f"camera {self.blamed[0]}: " if len(self.blamed) == 1 else ""
-        return whose + self.pair.words(gate)
+        return whose + self.pair.words()
 
 
 def compare_pairs(pitch: Field, cameras: Sequence[CameraResponse]) -> list[Pair]:
-    """What those pairs of cameras say that should show some of the same markings."""
+    """Compare the pairs of cameras that should show some of the same markings."""
     by_id = {one.camera.id: one for one in cameras}
     found = []
     for pair in pairs_in_common(pitch, [one.camera for one in cameras]):
@@ -124,7 +121,7 @@ def compare_pairs(pitch: Field, cameras: Sequence[CameraResponse]) -> list[Pair]
 
 
 def _shift_px(pitch: Field, registered: Registration | None, cameras: Sequence[Camera]) -> float:
-    """Return how far apart a pair puts the same place, in pixels of the frame that shows it larger; inf if unknown."""
+    """Return the distance of a pair's places of one point, px of the frame that shows it larger; inf if unknown."""
     if registered is None:
         return np.inf
     apart = PIXEL_M * np.array([registered.dx_px, registered.dy_px])
@@ -147,22 +144,21 @@ def _register_lines(pitch: Field, first: CameraResponse, second: CameraResponse)
     )
 
 
-def measured_by_lines(pitch: Field, pairs: Sequence[Pair], cameras: Sequence[CameraResponse], gate: Gate) -> list[Pair]:
-    """Return the pairs, of which those that agree have the error that the lines measured in both views say.
+def measured_by_lines(pitch: Field, pairs: Sequence[Pair], cameras: Sequence[CameraResponse]) -> list[Pair]:
+    """Return the pairs, those that agree with the error by the lines measured in both views.
 
     So the error means the same whether or not the network has looked in full, and lines are measured finer than
-    responses. Whether two cameras contradict each other the responses say: a camera that takes one line for another
-    measures no contradiction.
+    responses. Contradictions come from the responses: a camera that takes one line for another measures none.
     """
     by_id = {one.camera.id: one for one in cameras}
     found = []
     for pair in pairs:
         both = [by_id[camera] for camera in pair.cameras]
-        lines = _register_lines(pitch, *both) if pair.agrees(gate) else None
+        lines = _register_lines(pitch, *both) if pair.agrees() else None
         if lines is not None:
             shift_px = _shift_px(pitch, lines, [one.camera for one in both])
             finer = replace(pair, error_px=lines.error_px, registration=lines, shift_px=shift_px)
-            pair = finer if finer.agrees(gate) else pair
+            pair = finer if finer.agrees() else pair
         found.append(pair)
     return found
 
@@ -170,7 +166,7 @@ def measured_by_lines(pitch: Field, pairs: Sequence[Pair], cameras: Sequence[Cam
 def compare_pairs_before(
     pitch: Field, stored: Mapping[str, CameraResponse], found: Mapping[str, Camera], pairs: Sequence[Pair]
 ) -> list[Pair]:
-    """What the same pairs said by the poses that were `stored`, by those that were `found` where these register."""
+    """Compare the same pairs by their `stored` poses, at the places of the `found` ones where these register."""
     before = []
     for pair in pairs:
         seeing = [stored[camera] for camera in pair.cameras]
@@ -184,40 +180,40 @@ def compare_pairs_before(
 
 
 def _both_see(first: Evidence, second: Evidence) -> bool:
-    """Whether both find most of the line that both should see, each where its pose puts it."""
+    """True if both find most of the line that both should see, each where its pose puts it."""
     _, a, b = np.intersect1d(first.index, second.index, return_indices=True)
-    return len(a) > 0 and float(np.mean(first.found[a] & second.found[b])) >= MOST
+    return len(a) > 0 and float(np.mean(first.found[a] & second.found[b])) >= 0.6
 
 
-def find_contradictions(pairs: Sequence[Pair], gate: Gate) -> list[Contradiction]:
-    """Who is to blame for pairs that disagree: whoever agrees with nobody, or else both.
+def find_contradictions(pairs: Sequence[Pair]) -> list[Contradiction]:
+    """Return the pairs that disagree and the cameras to blame: those that agree with nobody, or else both.
 
     Two that both agree with others contradict each other only where they share plenty and can be compared.
     """
-    held = {camera for pair in pairs if pair.agrees(gate) for camera in pair.cameras}
+    confirmed = {camera for pair in pairs if pair.agrees() for camera in pair.cameras}
     found = []
     for pair in pairs:
-        loose = [camera for camera in pair.cameras if camera not in held]
-        if pair.disagrees(gate) and (loose or (pair.plenty and pair.error_px is not None)):
+        loose = [camera for camera in pair.cameras if camera not in confirmed]
+        if pair.disagrees() and (loose or (pair.plenty and pair.error_px is not None)):
             found.append(Contradiction(pair, loose or pair.cameras))
     return found
 
 
-def refusal_by_pairs(camera: str, against: Sequence[Contradiction], gate: Gate) -> Refusal | None:
-    """Why a camera is refused that pairs are against, None where none is."""
-    its = [one.pair for one in against if camera in one.blamed]
-    if not its:
+def refusal_by_pairs(camera: str, against: Sequence[Contradiction]) -> Refusal | None:
+    """Return the refusal of a camera that pairs contradict, None where none does."""
+    contradicting = [one.pair for one in against if camera in one.blamed]
+    if not contradicting:
         return None
-    reason: Reason = "not-together" if its[0].error_px is None else "disagree"
-    return Refusal(reason, "; ".join(pair.words(gate) for pair in its))
+    reason: Reason = "not-together" if contradicting[0].error_px is None else "disagree"
+    return Refusal(reason, "; ".join(pair.words() for pair in contradicting))
 
 
-def stitch_error_px(pairs: Sequence[Pair], gate: Gate) -> float | None:
-    """The worst disagreement of pairs that confirm or contradict each other.
+def stitch_error_px(pairs: Sequence[Pair]) -> float | None:
+    """Return the worst disagreement of pairs that confirm or contradict each other.
 
-    None if none does, or if one cannot be brought together that should be.
+    None if none does, or if one cannot be registered that should be.
     """
-    telling = [pair for pair in pairs if pair.agrees(gate)] + [one.pair for one in find_contradictions(pairs, gate)]
+    telling = [pair for pair in pairs if pair.agrees()] + [one.pair for one in find_contradictions(pairs)]
     if any(pair.missed for pair in telling):
         return None
     return max((pair.error_px for pair in telling if pair.error_px is not None), default=None)

@@ -1,4 +1,4 @@
-"""What a result is worth without ground truth, and the gate that a bad one does not pass."""
+"""Quality gate: judges a result without ground truth, and refuses bad ones."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from worker.calibration.refinement.least_squares import FEWEST_MEASUREMENTS
 from worker.calibration.refinement.uncertainty import Deviation, GroundSigma, RefinedPose
 
 MUCH_UNEXPECTED = 0.4
-"""Of the segmentation on the pitch: so much of it beside all lines of the venue are lines of something else."""
+"""Share of the segmentation on the field beside all lines of the venue from which it shows lines of something else."""
 
 
 @dataclass(frozen=True)
@@ -51,13 +51,15 @@ class Gate:
     highest_ridge_m: float = 3.0
 
     def most_residual_px(self, camera: Camera) -> float:
-        """Rms offset of lines, in pixels of the camera's own frame, up to which a pose fits them."""
+        """Return the largest rms offset of lines, in pixels of the camera's own frame, for a pose that fits them."""
         return max(self.largest_residual_px * camera.intrinsics.relative_size, self.residual_floor_px)
 
     def least_share(self, seen: Evidence) -> float:
-        """Of the markings that has to be seen, 0..1, where chance finds as much as it does."""
+        """Return the least share of the markings that has to be seen, 0..1, beside what chance finds."""
         return seen.by_chance + self.least_agreement * max(1 - seen.by_chance, LEAST_ROOM)
 
+
+GATE = Gate()
 
 Reason = Literal[
     "view",
@@ -79,7 +81,7 @@ Reason = Literal[
 
 @dataclass(frozen=True)
 class Refusal:
-    """Why a pose must not replace the stored one: the `reason` in a word, and in words with numbers and what to do."""
+    """Refusal of a new pose: the `reason` in a word, and in words with numbers and what to do."""
 
     reason: Reason
     words: str
@@ -87,7 +89,7 @@ class Refusal:
 
 @dataclass(frozen=True)
 class Moved:
-    """From the stored pose to the new one: degrees, metres, and the mean shift of the visible markings in pixels."""
+    """Change from the stored pose to the new one: degrees, metres, mean shift of the visible markings in pixels."""
 
     rotation_deg: float
     position_m: float
@@ -95,32 +97,33 @@ class Moved:
 
     @classmethod
     def between(cls, pitch: Field, before: Camera, after: Camera) -> Moved:
-        """How far a camera moved."""
+        """Return the change of a camera's pose."""
         lines = pitch.line_points().position
         was = before.project(lines)
         shift = np.linalg.norm(after.project(lines) - was, axis=1)[inside(was, before.intrinsics.size)]
         shift = shift[np.isfinite(shift)]
         return cls(
             float(rotation_angles_deg(before.pose.rotation, after.pose.rotation)),
-            float(np.linalg.norm(after.pose.position - before.pose.position)),
+            before.distance_m(after),
             float(shift.mean()) if len(shift) else 0.0,
         )
 
-    def beyond(self, gate: Gate) -> bool:
-        """Whether it is more than a camera may move without somebody storing a new pose."""
-        return self.rotation_deg > gate.largest_rotation_deg or self.position_m > gate.largest_shift_m
+    @property
+    def exceeds_limits(self) -> bool:
+        """True if the change is larger than is allowed without somebody storing a new pose."""
+        return self.rotation_deg > GATE.largest_rotation_deg or self.position_m > GATE.largest_shift_m
 
-    def words(self, gate: Gate) -> str:
-        """How far it moved, and the limits."""
+    def words(self) -> str:
+        """Return the change in words, and the limits."""
         return (
-            f"turned by {self.rotation_deg:.1f} degrees (at most {gate.largest_rotation_deg} allowed) and moved by "
-            f"{self.position_m:.2f} m (at most {gate.largest_shift_m})"
+            f"turned by {self.rotation_deg:.1f} degrees (at most {GATE.largest_rotation_deg} allowed) and moved by "
+            f"{self.position_m:.2f} m (at most {GATE.largest_shift_m})"
         )
 
 
 @dataclass(frozen=True)
 class CameraResult(RefinedPose):
-    """One camera's answer, which the gate looks at: what the finish found, and what it is worth beside the stored pose.
+    """Result for one camera, which the gate judges: its refined pose, and what it is worth beside the stored one.
 
     `view`: whether its frame could be used, and what is wrong with it if not; `overlap`: of expected lines and the
     segmentation; `evidence_before`: computes that at the stored pose, lazily, since a good answer needs none;
@@ -142,12 +145,12 @@ class CameraResult(RefinedPose):
 
     @property
     def accepted(self) -> bool:
-        """Whether the gate lets its pose replace the stored one."""
+        """True if the gate lets the pose replace the stored one."""
         return self.refusal is None
 
     @property
     def rejected_because(self) -> str | None:
-        """The words of its refusal."""
+        """Words of the refusal."""
         return None if self.refusal is None else self.refusal.words
 
 
@@ -160,39 +163,37 @@ def in_one_sentence(reasons: Sequence[str]) -> str:
     return "; ".join([*(reason.removesuffix(".") for reason in before), last]).replace("?; ", "? ")
 
 
-def credible_deviations(
-    deviations: Sequence[Deviation], results: Sequence[CameraResult], gate: Gate
-) -> list[Deviation]:
-    """Those deviations that were read off cameras which see the pitch where they expect it."""
-    lost = {result.camera.id for result in results if result.evidence.agreement < gate.least_agreement}
+def credible_deviations(deviations: Sequence[Deviation], results: Sequence[CameraResult]) -> list[Deviation]:
+    """Return the deviations that were read off cameras which see the field where they expect it."""
+    lost = {result.camera.id for result in results if result.evidence.agreement < GATE.least_agreement}
     of_field = not lost or any(result.accepted for result in results)
     return [d for d in deviations if (of_field if d.camera is None else d.camera not in lost)]
 
 
-def ridge_rejection(pitch: Field, gate: Gate) -> Refusal | None:
-    """Why a pitch whose ridge was found along with the poses cannot be one; None when it can."""
+def ridge_rejection(pitch: Field) -> Refusal | None:
+    """Return the refusal of a field whose ridge was found along with the poses and cannot be one; None when it can."""
     height = 0.0 if pitch.ridge is None else float(pitch.ridge[0, 2])
-    if 0 <= height <= gate.highest_ridge_m:
+    if 0 <= height <= GATE.highest_ridge_m:
         return None
     return Refusal(
         "ridge",
         f"the lines fit best with a ridge at {height:.3f} m, and a pitch has one between 0 and "
-        f"{gate.highest_ridge_m:.0f} m; calibrate without fit_ridge",
+        f"{GATE.highest_ridge_m:.0f} m; calibrate without fit_ridge",
     )
 
 
-def alone_rejection(result: CameraResult, gate: Gate) -> Refusal | None:
-    """Why a camera's pose must not replace the stored one whatever the others say, and what to do; None when it may."""
+def alone_rejection(result: CameraResult) -> Refusal | None:
+    """Return the refusal of a camera's pose whatever the others say; None when it may replace the stored one."""
     if not result.view.usable:
         return Refusal(_reason_of(result.view), result.view.words)
     moved, seen = result.moved, result.evidence
-    if seen.agreement < gate.least_agreement:
+    if seen.agreement < GATE.least_agreement:
         return Refusal(
             "lines",
             in_one_sentence(
                 [
                     f"the markings in the frame do not fit this pitch: {seen.share:.0%} of their length is where it "
-                    f"ought to be, at least {gate.least_share(seen):.0%} are needed ({seen.by_chance:.0%} is seen "
+                    f"ought to be, at least {GATE.least_share(seen):.0%} are needed ({seen.by_chance:.0%} is seen "
                     "anywhere); is it the right camera and the right sport, is the view free and lit, is the stored "
                     "pose within a few degrees?",
                     *_other_lines(result),
@@ -204,7 +205,7 @@ def alone_rejection(result: CameraResult, gate: Gate) -> Refusal | None:
             "few-lines",
             f"fewer than {FEWEST_MEASUREMENTS} points of lines could be measured; is the view free and lit?",
         )
-    limit = gate.most_residual_px(result.camera)
+    limit = GATE.most_residual_px(result.camera)
     if result.residual_px > limit:
         return Refusal(
             "residual",
@@ -216,51 +217,51 @@ def alone_rejection(result: CameraResult, gate: Gate) -> Refusal | None:
                 ]
             ),
         )
-    if result.zoom is not None and zoomed_beyond_doubt(result, gate):
+    if result.zoom is not None and zoomed_beyond_doubt(result):
         return Refusal(
             "zoomed",
             f"{zoom_in_words(result.camera, result.zoom)}, which puts the camera {result.zoom_shift_m:.2f} m from "
             "where it seems to be: zoom or focus have moved, or the lens is not this one; calibrate the lens again",
         )
-    if undetermined := _why_undetermined(result.ground_sigma, gate):
+    if undetermined := _why_undetermined(result.ground_sigma):
         return Refusal("undetermined", undetermined)
-    beaten_by_any = seen.agreement < 1 - gate.agreement_loss
-    if beaten_by_any and seen.agreement < (before := result.evidence_before()).agreement - gate.agreement_loss:
+    beaten_by_any = seen.agreement < 1 - GATE.agreement_loss
+    if beaten_by_any and seen.agreement < (before := result.evidence_before()).agreement - GATE.agreement_loss:
         return Refusal(
             "stored-better",
             f"the stored pose fits the frame better: {before.share:.0%} of the markings' length is "
             f"seen where it puts them, with the new pose {seen.share:.0%}",
         )
-    if moved.beyond(gate):
+    if moved.exceeds_limits:
         return Refusal(
             "moved",
-            f"{moved.words(gate)}; if somebody moved the camera, accept the job by hand once its picture is right",
+            f"{moved.words()}; if somebody moved the camera, accept the job by hand once its picture is right",
         )
-    if result.moved_in_all is not None and result.moved_in_all.beyond(gate):
+    if result.moved_in_all is not None and result.moved_in_all.exceeds_limits:
         return Refusal(
             "moved",
-            f"{result.moved_in_all.words(gate)}, over all jobs since its pose was last stored by hand: its mount may "
+            f"{result.moved_in_all.words()}, over all jobs since its pose was last stored by hand: its mount may "
             "be giving way; look at it, then store this pose, or accept the job by hand",
         )
     return None
 
 
-def _why_undetermined(ground: GroundSigma | None, gate: Gate) -> str | None:
+def _why_undetermined(ground: GroundSigma | None) -> str | None:
     advice = "let the camera see lines in more than one direction, or measure lens or field again"
     if ground is None:
         return f"no marking is in view where the pose puts the camera; {advice}"
-    metres, pixels, beyond = ground.worst(gate.largest_ground_sigma_m, gate.largest_ground_sigma_px)
+    metres, pixels, beyond = ground.worst(GATE.largest_ground_sigma_m, GATE.largest_ground_sigma_px)
     if not beyond:
         return None
     return (
         f"the visible lines do not determine the pose: what is in view may lie {metres:.2f} m ({pixels:.1f} px) from "
-        f"where it is put on the ground (sigma, at most {gate.largest_ground_sigma_m} m or "
-        f"{gate.largest_ground_sigma_px} px allowed); {advice}"
+        f"where it is put on the ground (sigma, at most {GATE.largest_ground_sigma_m} m or "
+        f"{GATE.largest_ground_sigma_px} px allowed); {advice}"
     )
 
 
 def _reason_of(view: ViewCondition) -> Reason:
-    """What the picture shows is one reason, whatever it is; what it is of, and where its pose looks, are others."""
+    """Return the reason of an unusable view: `view` for all that the picture itself shows."""
     match view.cause:
         case "other-camera" | "no-markings-in-view" as reason:
             return reason
@@ -269,7 +270,7 @@ def _reason_of(view: ViewCondition) -> Reason:
 
 
 def _other_lines(result: CameraResult) -> list[str]:
-    """What to do about lines that are not the venue's, where there are many."""
+    """Return what to do about lines that are not the venue's, where there are many."""
     if not films_a_field(result.camera.pose):
         return [
             "from such a pose no field is filmed (it hangs upside down, or far away): was it written in another "
@@ -285,14 +286,14 @@ def _other_lines(result: CameraResult) -> list[str]:
     ]
 
 
-def zoomed_beyond_doubt(result: CameraResult, gate: Gate) -> bool:
-    """Whether the lines contradict the focal length, and the pose with it: either alone may be chance."""
+def zoomed_beyond_doubt(result: CameraResult) -> bool:
+    """True if the lines contradict the focal length, and the pose with it: either alone may be chance."""
     sure = result.zoom is not None and is_sure(result.zoom)
-    return sure and result.zoom_shift_m > gate.largest_zoomed_m
+    return sure and result.zoom_shift_m > GATE.largest_zoomed_m
 
 
 def zoom_in_words(camera: Camera, zoom: Deviation) -> str:
-    """By how much the focal length is not what the venue says."""
+    """Return in words how far the focal length is from what the venue says."""
     focal = camera.intrinsics.focal_length_px
     by = f"{abs(zoom.value) / focal:.2%} ± {zoom.sigma / focal:.2%}"
     return f"the lines fit a focal length {by} {'longer' if zoom.value > 0 else 'shorter'} than the venue says"

@@ -1,1 +1,1 @@
-"""What a calibration is about: cameras, the pitch, the ground, and what of it is in view."""
+"""Geometry of a calibration: cameras, lenses, field, ground, projection and visibility."""

@@ -28,20 +28,20 @@ NEAREST_DEPTH_M = 0.1
 
 @dataclass(frozen=True)
 class Pose:
-    """Where a camera stands and looks: `rotation` (3,) rad, world to camera; `position` (3,) m in the world."""
+    """Pose of a camera: `rotation` (3,) rad, world to camera; `position` (3,) m, the camera's centre in the world."""
 
     rotation: Array
     position: Array
 
     @classmethod
     def from_translation(cls, rotation: ArrayLike, translation: ArrayLike) -> Pose:
-        """From OpenCV's rvec and tvec (tvec = -R position)."""
+        """Return the pose of OpenCV's rvec and tvec (tvec = -R position)."""
         rvec = np.asarray(rotation, dtype=float)
         return cls(rvec, -rotation_matrices(rvec).T @ np.asarray(translation, dtype=float))
 
     @classmethod
     def looking_at(cls, position: ArrayLike, target: ArrayLike, roll_deg: float = 0.0) -> Pose:
-        """A camera at `position` that sees `target` in its principal point, horizon level but for `roll_deg`."""
+        """Return the pose at `position` with `target` in the principal point and a level horizon but for `roll_deg`."""
         centre = np.asarray(position, dtype=float)
         forward = np.asarray(target, dtype=float) - centre
         forward = forward / np.linalg.norm(forward)
@@ -64,7 +64,7 @@ class Pose:
 
 @dataclass(frozen=True)
 class Camera:
-    """One camera of an installation: its lens and its pose, and what of its picture is `ignored`."""
+    """One camera of an installation: lens, pose, and the `ignored` parts of its picture."""
 
     id: str
     intrinsics: Lens
@@ -72,22 +72,26 @@ class Camera:
     ignored: Ignored | None = None
 
     def project(self, points: Array) -> Array:
-        """World points (..., 3) to pixels (..., 2); NaN behind the camera and outside what the lens model covers."""
+        """Project world points (..., 3) to pixels (..., 2); NaN behind the camera and outside the lens model."""
         in_a_row = points.reshape(-1, 3).T
         planes = _turned_and_bent(in_a_row, self.pose.matrix[None], self.pose.position[None], self.intrinsics)
         return np.stack(planes, axis=-1)[0].reshape(*points.shape[:-1], 2)
 
     def rays(self, pixels: ArrayLike) -> Array:
-        """Directions in the world (..., 3), not normalised (depth 1), through pixels (..., 2)."""
+        """Return directions in the world (..., 3), not normalised (depth 1), through pixels (..., 2)."""
         plane = self.intrinsics.undistort(pixels)
         return np.concatenate([plane, np.ones_like(plane[..., :1])], axis=-1) @ self.pose.matrix
 
+    def distance_m(self, other: Camera) -> float:
+        """Return the distance (m) between the positions of two cameras."""
+        return float(np.linalg.norm(self.pose.position - other.pose.position))
+
     def with_pose(self, pose: Pose) -> Camera:
-        """The same lens elsewhere."""
+        """Return the camera with another pose."""
         return Camera(self.id, self.intrinsics, pose, self.ignored)
 
     def with_lens(self, intrinsics: Lens) -> Camera:
-        """Another lens in the same place."""
+        """Return the camera with another lens."""
         return Camera(self.id, intrinsics, self.pose, self.ignored)
 
     def resized(self, width_px: int) -> Camera:
@@ -96,7 +100,7 @@ class Camera:
         return Camera(self.id, lens, self.pose, None if self.ignored is None else self.ignored.resized(lens.size))
 
     def sees(self, pixels: Array) -> NDArray[np.bool_]:
-        """Which pixels (..., 2) lie in the picture where it is of use."""
+        """True for pixels (..., 2) inside the picture and not ignored."""
         within = inside(pixels, self.intrinsics.size)
         return within if self.ignored is None else within & ~self.ignored.at(pixels, self.intrinsics.size)
 
@@ -125,6 +129,6 @@ def _turned_and_bent(points: Plane, matrices: Array, positions: Array, intrinsic
 
 
 def inside(pixels: NDArray[np.floating[Any]], size: tuple[int, int], margin: float = 0.0) -> NDArray[np.bool_]:
-    """Which pixels (..., 2) lie in a picture of `size` (width, height), at least `margin` from its border."""
+    """True for pixels (..., 2) inside a picture of `size` (width, height), at least `margin` from its border."""
     x, y = pixels[..., 0], pixels[..., 1]
     return (x >= margin) & (y >= margin) & (x <= size[0] - 1 - margin) & (y <= size[1] - 1 - margin)

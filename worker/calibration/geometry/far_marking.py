@@ -1,4 +1,4 @@
-"""How far apart two cameras put the same pixels on the ground, at the marking that is farthest away.
+"""Distance on the ground between the places where two cameras put the same pixels of the farthest marking.
 
 Two poses with their lenses may agree to a pixel everywhere and still disagree by decimetres where the ground is far
 away and seen at a flat angle. A length there says what a focal length in per cent does not.
@@ -12,16 +12,12 @@ from worker.calibration.geometry.camera import Array, Camera
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.visibility import VisibleLines
 
-LEAST_SHARE = 0.1
-"""A marking counts of which so much is in view, as a share of that of the marking that is seen most: arcs in the far
-corners are farther than the far touchline, and a metre long."""
-
 
 def far_marking_shift_m(pitch: Field, camera: Camera, other: Camera) -> float | None:
-    """How far apart (m, on the ground) two cameras put the pixels of the farthest marking that `camera` sees.
+    """Return the distance (m, on the ground) between the pixels of the farthest marking in view by two cameras.
 
-    The median over its points in view, each on the level plane through it; None if there are none, or if most of
-    their pixels meet the ground nowhere by the pose and lens of `other`.
+    The median over the marking's points in view of `camera`, each on the level plane through it; None if there are
+    none, or if most of their pixels meet the ground nowhere by the pose and lens of `other`.
     """
     points = farthest_marking(pitch, camera)
     if len(points) == 0:
@@ -32,17 +28,18 @@ def far_marking_shift_m(pitch: Field, camera: Camera, other: Camera) -> float | 
 
 
 def farthest_marking(pitch: Field, camera: Camera) -> Array:
-    """The line points (N, 3) in view of the marking that is farthest from a camera on average."""
+    """Return the points (N, 3) in view of the marking that is farthest from a camera on average."""
     seen = VisibleLines.from_camera(pitch.line_points(), camera).points
     away = np.linalg.norm(seen.position - camera.pose.position, axis=1)
     which, count = np.unique(seen.marking, return_counts=True)
-    long_enough = which[count >= LEAST_SHARE * count.max(initial=0)]
+    # Arcs in the far corners are farther away than the far touchline, but only a metre long.
+    long_enough = which[count >= 0.1 * count.max(initial=0)]
     farthest = max(long_enough, key=lambda number: float(away[seen.marking == number].mean()), default=None)
     return seen.position[seen.marking == farthest]
 
 
 def on_the_ground(camera: Camera, pixels: Array, height: Array) -> Array:
-    """Where (N, 2) the rays through pixels (N, 2) meet the planes z = height (N,); NaN where they do not."""
+    """Return the points (N, 2) where rays of pixels (N, 2) meet the planes z = height (N,); NaN if nowhere."""
     ray = camera.rays(pixels)
     with np.errstate(divide="ignore", invalid="ignore"):
         along = (height - camera.pose.position[2]) / ray[:, 2]

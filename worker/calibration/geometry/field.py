@@ -15,13 +15,9 @@ from numpy.typing import NDArray
 from fields.landmarks import find
 from fields.shapes import WHITE, Arc, Line, Shape
 from fields.template import TURF_M, Template, load
-from worker.calibration.geometry.camera import Array
+from worker.calibration.geometry.arrays import Array, take_rows
 
 FOOTBALL = load("football")
-
-ARC_STEP_M = 0.05
-LEAST_HIP_M = 0.5
-"""A ridge ends so far from the goal lines at least: a roof has no upright sides."""
 
 
 @dataclass(frozen=True)
@@ -38,12 +34,12 @@ class Marking:
 
     @property
     def closed(self) -> bool:
-        """Whether the line ends where it begins."""
+        """True if the line ends where it begins."""
         return bool(np.allclose(self.centre[0], self.centre[-1]))
 
     @property
     def spot(self) -> bool:
-        """Whether it is a disc: wider than it is long."""
+        """True if the marking is a disc: wider than it is long."""
         return bool(np.linalg.norm(self.centre[-1] - self.centre[0]) < self.width and not self.closed)
 
 
@@ -69,16 +65,7 @@ class LinePoints:
         return len(self.position)
 
     def __getitem__(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> LinePoints:
-        return LinePoints(
-            self.position[chosen],
-            self.tangent[chosen],
-            self.normal[chosen],
-            self.width[chosen],
-            self.marking[chosen],
-            self.colour[chosen],
-            self.spacing,
-            self.uneven_m,
-        )
+        return take_rows(self, chosen)
 
 
 @dataclass(frozen=True)
@@ -101,7 +88,7 @@ class Field:
     sigma: Mapping[str, float] = field(default_factory=dict)
 
     def resized(self, *, length: float | None = None, width: float | None = None) -> Field:
-        """The same pitch with another length or width, point by point: with as many dashes."""
+        """Return the field with another length or width, point by point and with as many dashes."""
         return replace(
             self,
             length=self.length if length is None else length,
@@ -110,15 +97,15 @@ class Field:
         )
 
     def dashed_anew(self) -> Field:
-        """The same pitch with the dashes that fit on its lines."""
+        """Return the field with as many dashes as fit on its lines."""
         return replace(self, dashed=None)
 
     def flat(self) -> Field:
-        """The same pitch on a plane."""
+        """Return the field without a ridge, on a plane."""
         return replace(self, ridge=None)
 
     def raised(self, by: float) -> Field:
-        """The same pitch with a ridge that is higher by so many metres; a flat one gets a ridge between hips of 45°."""
+        """Return the field with its ridge raised by so many metres; a flat one gets a ridge between hips of 45°."""
         if self.ridge is not None:
             return replace(self, ridge=self.ridge + [0.0, 0.0, by])
         end = max((self.length - self.width) / 2, 0.0)
@@ -126,27 +113,28 @@ class Field:
 
     @property
     def ridge_height(self) -> float:
-        """Of the ridge above the corners; 0 of a flat pitch."""
+        """Height (m) of the ridge above the corners; 0 for a flat field."""
         return 0.0 if self.ridge is None else float(self.ridge[0, 2])
 
     @property
     def ridge_length(self) -> float:
-        """Between the ends of the ridge; of a flat pitch, of the ridge that `raised` would give it."""
+        """Distance (m) between the ends of the ridge; for a flat field, of the ridge that `raised` would add."""
         ridge = self.raised(0.0).ridge
         assert ridge is not None
         return float(abs(ridge[1, 0] - ridge[0, 0]))
 
     def with_ridge_length(self, length: float) -> Field:
-        """The same pitch with the ends of its ridge so far apart, as far as the pitch has room, around where it was."""
+        """Return the field with a ridge of this length (m) about the same middle, as far as the field has room."""
         raised = self.raised(0.0)
         assert raised.ridge is not None
         (start, end) = raised.ridge[np.argsort(raised.ridge[:, 0])]
         middle = (start[0] + end[0]) / 2
-        half = min(max(length / 2, 0.0), self.length / 2 - abs(middle) - LEAST_HIP_M)
+        # Least distance of the ridge's ends from the goal lines: a roof has no upright sides.
+        half = min(max(length / 2, 0.0), self.length / 2 - abs(middle) - 0.5)
         return replace(raised, ridge=np.array([[middle - half, *start[1:]], [middle + half, *end[1:]]]))
 
     def height(self, xy: Array) -> Array:
-        """Height (...) of the surface at (..., 2): the paper's four-plane hip roof; 0 off the pitch."""
+        """Return the height (...) of the surface at (..., 2): the paper's four-plane hip roof; 0 off the field."""
         if self.ridge is None:
             return np.zeros(xy.shape[:-1])
         start, end = self.ridge[np.argsort(self.ridge[:, 0])]
@@ -165,11 +153,11 @@ class Field:
         return top * np.clip(planes.min(axis=0), 0.0, 1.0)
 
     def lift(self, xy: Array) -> Array:
-        """Points (..., 2) on the pitch to the surface (..., 3)."""
+        """Return points (..., 2) of the field lifted to its surface (..., 3)."""
         return np.concatenate([xy, self.height(xy)[..., None]], axis=-1)
 
     def markings(self) -> list[Marking]:
-        """All markings of the template, as centre lines."""
+        """Return all markings of the template, as centre lines."""
         return list(self._markings)
 
     @cached_property
@@ -181,19 +169,19 @@ class Field:
         return {"length": self.length, "width": self.width, "line": self.line_width, **self.measures}
 
     def whole_names(self) -> list[str]:
-        """Of each of the markings the name of what is painted: the same for all dashes of a broken line."""
+        """Return the name of what each marking is a part of: one name for all dashes of a broken line."""
         return [self.template.whole(marking.name) for marking in self.markings()]
 
     def places(self) -> dict[str, Array]:
-        """Where the named points of the template are, (3,) each, on the surface."""
+        """Return the named points of the template on the surface, (3,) each."""
         return {name: self.lift(np.array(point)) for name, point in self.template.places(self._size).items()}
 
     def place(self, name: str) -> Array:
-        """The point (3,) that somebody calls so, on the surface. Raises `fields.landmarks.UnknownLandmark`."""
+        """Return the point (3,) of a name on the surface. Raises `fields.landmarks.UnknownLandmark`."""
         return self.lift(np.array(find(name, self.template, self._size)))
 
     def line_points(self, spacing: float = 0.25) -> LinePoints:
-        """Points every `spacing` metres on the centres of all markings, on the surface, with directions."""
+        """Return points every `spacing` metres on the centres of all markings, on the surface, with directions."""
         if spacing not in self._drawn:
             markings = self.markings()
             counts = [fitting(marking.centre, spacing) for marking in markings]
@@ -202,18 +190,18 @@ class Field:
 
     @cached_property
     def _drawn(self) -> dict[float, LinePoints]:
-        """The line points that have been asked for, by their spacing: dozens of times in a calibration."""
+        """Line points by their spacing: a calibration asks for them dozens of times."""
         return {}
 
     def other_points(self, spacing: float = 0.25) -> LinePoints | None:
-        """The same of what else is painted there, None where nothing is."""
+        """Return the line points of `others`, lines that are painted there and not the field's; None without any."""
         others = [_marking(shape) for shape in self.others]
         if not others:
             return None
         return self._line_points(others, [fitting(marking.centre, spacing) for marking in others], spacing)
 
     def same_line_points(self, others: LinePoints) -> LinePoints:
-        """The points that are those of the pitch before it was `resized`: as many on each marking, as far along it."""
+        """Return the points that correspond to those of the field before `resized`: as many on each marking."""
         counts: list[int] = np.bincount(others.marking).tolist()
         return self._line_points(self.markings(), counts, others.spacing)
 
@@ -239,23 +227,23 @@ class Field:
         )
 
     def _in_surface(self, xy: Array, direction: Array, step: float = 0.01) -> Array:
-        """Unit vectors (N, 3) that follow the surface from xy (N, 2) in horizontal directions (N, 2)."""
+        """Return unit vectors (N, 3) that follow the surface from xy (N, 2) in horizontal directions (N, 2)."""
         move = self.lift(xy + step * direction) - self.lift(xy - step * direction)
         return move / np.linalg.norm(move, axis=-1, keepdims=True)
 
 
 def resample(polyline: Array, spacing: float) -> tuple[Array, Array]:
-    """Points about every `spacing` along a polyline (n, 2), in the middle of equal pieces, and unit tangents there."""
+    """Return points about every `spacing` along a polyline (n, 2), in the middle of equal pieces, and unit tangents."""
     return equal_pieces(polyline, fitting(polyline, spacing))
 
 
 def fitting(polyline: Array, spacing: float) -> int:
-    """How many pieces of about `spacing` a polyline (n, 2) has, at least one."""
+    """Return the number of pieces of about `spacing` in a polyline (n, 2), at least one."""
     return max(1, round(float(np.linalg.norm(np.diff(polyline, axis=0), axis=1).sum()) / spacing))
 
 
 def equal_pieces(polyline: Array, count: int) -> tuple[Array, Array]:
-    """The middles (count, 2) of equal pieces of a polyline (n, 2), and unit tangents there."""
+    """Return the middles (count, 2) of equal pieces of a polyline (n, 2), and unit tangents there."""
     pieces = np.diff(polyline, axis=0)
     lengths = np.linalg.norm(pieces, axis=1)
     reached = np.concatenate([[0.0], np.cumsum(lengths)])
@@ -270,7 +258,7 @@ def _marking(shape: Shape) -> Marking:
         case Line():
             return Marking(shape.name, np.array(shape.points), shape.width, shape.colour)
         case Arc():
-            count = max(8, int(np.ceil((shape.end - shape.start) * shape.radius / ARC_STEP_M)))
+            count = max(8, int(np.ceil((shape.end - shape.start) * shape.radius / 0.05)))
             angle = np.linspace(shape.start, shape.end, count + 1)
             around = shape.radius * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
             return Marking(shape.name, shape.centre + around, shape.width, shape.colour)

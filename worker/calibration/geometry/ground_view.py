@@ -1,4 +1,4 @@
-"""What a camera's picture shows at places of the world: sampled at any grid, at the level of detail that calls for."""
+"""Resample a camera's picture on a grid in the world, at a matching level of detail."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ Mask = NDArray[np.bool_]
 
 
 def ground_grid(columns: int, rows: int, step_m: float, centre: tuple[float, float] = (0.0, 0.0)) -> Array:
-    """Pitch points (2 rows + 1, 2 columns + 1, 2) every `step_m` around `centre`: x to the right, y up."""
+    """Return field points (2 rows + 1, 2 columns + 1, 2) every `step_m` around `centre`: x to the right, y up."""
     x = centre[0] + step_m * np.arange(-columns, columns + 1)
     y = centre[1] + step_m * np.arange(rows, -rows - 1, -1)
     return np.stack(np.meshgrid(x, y), axis=-1)
 
 
 def sampled(image: NDArray[Any], pixels: NDArray[np.floating[Any]], valid: Mask) -> NDArray[Any]:
-    """Values (H, W[, C]) of an image at pixels (H, W, 2) that are `valid`, 0 elsewhere.
+    """Sample an image at pixels (H, W, 2): values (H, W[, C]), 0 where not `valid`.
 
-    Where the pixels lie wider than those of the image, means over about the area between them.
+    Where the pixels lie wider than those of the image, values are means over about the area between them.
     """
     x, y = (np.array(pixels[..., axis], np.float32) for axis in (0, 1))
     level = level_of_detail(pixels)
@@ -43,15 +43,15 @@ def sampled(image: NDArray[Any], pixels: NDArray[np.floating[Any]], valid: Mask)
 
 
 def level_of_detail(pixels: NDArray[np.floating[Any]]) -> NDArray[np.uint8]:
-    """How often (H, W) an image is halved before it is sampled at pixels (H, W, 2), neighbours in a picture."""
+    """Return how often (H, W) an image is halved before sampling at pixels (H, W, 2), neighbours in a picture."""
     x, y = (np.array(pixels[..., axis], np.float32) for axis in (0, 1))
     return np.clip(np.floor(0.5 * np.log2(np.maximum(_footprint(x, y), 1.0))), 0, 5).astype(np.uint8)
 
 
 def quality(size: tuple[int, int], pixels: Array) -> NDArray[np.float32]:
-    """How well a camera of `size` sees at its pixels (H, W, 2), neighbours in a picture: 0 outside of its frame.
+    """Return a weight (H, W) of a camera's pixels (H, W, 2), neighbours in a picture: 0 outside its frame of `size`.
 
-    1 in the middle of the frame, next to 0 at its border; the better, the finer it resolves the point.
+    Largest in the middle of the frame, next to 0 at its border; larger where the camera resolves a point more finely.
     """
     x, y = (np.ascontiguousarray(pixels[..., axis], np.float32) for axis in (0, 1))
     width, height = size
@@ -61,13 +61,13 @@ def quality(size: tuple[int, int], pixels: Array) -> NDArray[np.float32]:
 
 
 def box(mask: Mask) -> tuple[slice, slice]:
-    """The rows and columns that hold all of a mask (H, W) that is not empty."""
+    """Return the rows and columns of the bounding box of a mask (H, W) that is not empty."""
     rows, columns = (np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0))
     return slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
 
 
 def ground_view(pitch: Field, camera: Camera, image: NDArray[Any], grid_xy: Array) -> tuple[NDArray[Any], Mask]:
-    """What a camera shows at points of the pitch: values (H, W[, C]) at (H, W, 2) metres, and where it sees them.
+    """Sample a camera's image at field points (H, W, 2), m: values (H, W[, C]), and a mask (H, W) of points in view.
 
     `image`: uint8 or float32 (height, width[, C]) of the size of the camera's intrinsics. Values are means over about
     the area between the points of the grid where that is coarser than the image.
@@ -78,7 +78,7 @@ def ground_view(pitch: Field, camera: Camera, image: NDArray[Any], grid_xy: Arra
 
 
 def _footprint(x: NDArray[np.float32], y: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Area (H, W) in source pixels of each pixel of the picture, from source positions x, y (H, W); 0 where NaN."""
+    """Return the area (H, W) in source pixels of each pixel, from source positions x, y (H, W); 0 where NaN."""
     (x_down, x_right), (y_down, y_right) = np.gradient(x), np.gradient(y)
     return np.nan_to_num(np.abs(x_right * y_down - y_right * x_down), nan=0.0, posinf=0.0)
 

@@ -1,4 +1,4 @@
-"""Parts of a camera's picture that somebody has marked as of no use: a railing, a screen, burnt-in graphics."""
+"""Ignored parts of a camera's picture: a railing, a screen, burnt-in graphics."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Ignored:
 
     @cached_property
     def area(self) -> NDArray[np.bool_]:
-        """Which pixels (H, W) are ignored: those in any of the polygons, edges included."""
+        """Mask (H, W) of the ignored pixels: those in any of the polygons, edges included."""
         area = np.zeros((self.size[1], self.size[0]), np.uint8)
         for polygon in self.polygons:
             cv2.fillPoly(area, [np.rint(polygon * 16).astype(np.int32)], 1, shift=4)
@@ -32,7 +32,7 @@ class Ignored:
         return Ignored([(polygon + 0.5) * ratio - 0.5 for polygon in self.polygons], size)
 
     def at(self, pixels: NDArray[np.floating], size: tuple[int, int]) -> NDArray[np.bool_]:
-        """Which pixels (..., 2) of the picture, shown at `size`, are ignored; none outside it."""
+        """True for ignored pixels (..., 2) of the picture shown at `size`; false outside it."""
         column, row = (
             np.nan_to_num((pixels[..., axis] + 0.5) * self.size[axis] / size[axis] - 0.5, nan=-1.0) for axis in (0, 1)
         )

@@ -1,4 +1,4 @@
-"""Lenses: OpenCV's two models, what each makes of a ray, and the derivatives of that.
+"""Lenses: OpenCV's two models, with projection and analytic derivatives.
 
 A lens bends a ray, given by its undistorted image coordinates at depth 1 (x right, y down), to distorted ones, and its
 matrix makes pixels of those (pixel centres at integers). The models differ in how they bend alone.
@@ -22,13 +22,14 @@ SigmaSource = Literal["lines"]
 DISTORTION_LENGTHS = (0, 4, 5, 8, 12, 14)
 FISHEYE_DISTORTION_LENGTHS = (0, 4)
 WIDEST_FISHEYE_RAD = np.radians(89.0)
-"""How far off its axis a fisheye is used: beyond a right angle there are no image coordinates at depth 1."""
+"""Largest angle off the axis at which a fisheye is used: from a right angle on there are no image coordinates at depth
+1."""
 IN_PIXELS = ("fx", "fy", "cx", "cy")
-LENS_NUMBERS = ("focal_length_px", "principal_point_x_px", "principal_point_y_px", "aspect", "k1", "k2")
-"""The numbers of a lens that lines are asked for: fx, with which fy changes in proportion; cx and cy; fy / fx, which
-changes fy alone; the first two coefficients of the distortion."""
-SIGMA_NAMES = dict(zip(LENS_NUMBERS, ("fx", "cx", "cy", "aspect", "k1", "k2"), strict=True))
-"""What these numbers are called in the `sigma` of a lens."""
+LENS_PARAMETERS = ("focal_length_px", "principal_point_x_px", "principal_point_y_px", "aspect", "k1", "k2")
+"""Lens parameters that lines can determine: fx, with which fy changes in proportion; cx and cy; fy / fx, which changes
+fy alone; the first two coefficients of the distortion."""
+SIGMA_NAMES = dict(zip(LENS_PARAMETERS, ("fx", "cx", "cy", "aspect", "k1", "k2"), strict=True))
+"""Names of these parameters in the `sigma` of a lens."""
 
 
 @dataclass(frozen=True)
@@ -47,37 +48,37 @@ class Lens(ABC):
     sigma_from: SigmaSource | None = None
     model: ClassVar[LensModel]
     terms: ClassVar[int]
-    """How many coefficients the model has."""
+    """Number of coefficients of the model."""
 
     def distort(self, rays: Array) -> Array:
-        """Undistorted image coordinates at depth 1, (..., 2), to pixels (..., 2); NaN beyond `largest_radius`."""
+        """Project undistorted image coordinates (..., 2) at depth 1 to pixels (..., 2); NaN beyond `largest_radius`."""
         return np.stack(self.distort_planes(rays[..., 0], rays[..., 1]), axis=-1)
 
     def distort_planes(self, x: Plane, y: Plane) -> tuple[Plane, Plane]:
-        """`distort` for columns and rows (...) apart, in their own precision: what large populations take."""
+        """Do as `distort` for columns and rows (...) apart, in their own precision: large populations need it."""
         xd, yd = self._bent(x, y)
         (fx, skew, cx), (_, fy, cy) = self.matrix[:2].tolist()
         return fx * xd + skew * yd + cx, fy * yd + cy
 
-    def slopes(self, rays: Array) -> Array:
-        """The derivative (..., 2, 2) of the pixels of rays (..., 2) by the rays; NaN beyond `largest_radius`."""
+    def jacobian(self, rays: Array) -> Array:
+        """Jacobian (..., 2, 2) of the pixels of rays (..., 2) by the rays; NaN beyond `largest_radius`."""
         return self.matrix[:2, :2] @ self._bent_by_ray(rays)
 
-    def slopes_by_numbers(self, rays: Array) -> Array:
-        """The derivative (..., 2, 6) of the pixels of rays (..., 2) by `LENS_NUMBERS`; NaN beyond `largest_radius`."""
+    def jacobian_by_parameters(self, rays: Array) -> Array:
+        """Jacobian (..., 2, 6) of the pixels of rays (..., 2) by `LENS_PARAMETERS`; NaN beyond `largest_radius`."""
         xd, yd = self._bent(rays[..., 0], rays[..., 1])
         (fx, _), (_, fy) = self.matrix[:2, :2].tolist()
-        slopes = np.zeros((*rays.shape, len(LENS_NUMBERS)))
-        slopes[..., 0, 0], slopes[..., 1, 0] = xd, fy / fx * yd
-        slopes[..., 0, 1] = slopes[..., 1, 2] = 1.0
-        slopes[..., 1, 3] = fx * yd
-        slopes[..., 4:] = self.matrix[:2, :2] @ self._bent_by_terms(rays)
-        slopes[np.isnan(xd)] = np.nan
-        return slopes
+        jacobian = np.zeros((*rays.shape, len(LENS_PARAMETERS)))
+        jacobian[..., 0, 0], jacobian[..., 1, 0] = xd, fy / fx * yd
+        jacobian[..., 0, 1] = jacobian[..., 1, 2] = 1.0
+        jacobian[..., 1, 3] = fx * yd
+        jacobian[..., 4:] = self.matrix[:2, :2] @ self._bent_by_terms(rays)
+        jacobian[np.isnan(xd)] = np.nan
+        return jacobian
 
     @abstractmethod
     def undistort(self, pixels: ArrayLike) -> Array:
-        """Pixels (..., 2) to undistorted image coordinates at depth 1 (..., 2); NaN where the model has no ray."""
+        """Return image coordinates (..., 2) at depth 1 of pixels (..., 2); NaN where the model has no ray."""
 
     @property
     @abstractmethod
@@ -89,18 +90,18 @@ class Lens(ABC):
 
     @abstractmethod
     def _bent(self, x: Plane, y: Plane) -> tuple[Plane, Plane]:
-        """Distorted coordinates (...) of rays (...), in their own precision; NaN beyond `largest_radius`."""
+        """Return distorted coordinates (...) of rays (...), in their own precision; NaN beyond `largest_radius`."""
 
     @abstractmethod
     def _bent_by_ray(self, rays: Array) -> Array:
-        """The derivative (..., 2, 2) of the distorted coordinates of rays (..., 2) by the rays."""
+        """Jacobian (..., 2, 2) of the distorted coordinates of rays (..., 2) by the rays."""
 
     @abstractmethod
     def _bent_by_terms(self, rays: Array) -> Array:
-        """The derivative (..., 2, 2) of the distorted coordinates of rays (..., 2) by k1 and k2."""
+        """Jacobian (..., 2, 2) of the distorted coordinates of rays (..., 2) by k1 and k2."""
 
     def border(self, a_side: int) -> Array:
-        """Pixels (4 `a_side`, 2) around the picture, in order, so many on each side."""
+        """Return pixels (4 `a_side`, 2) around the border of the picture, in order, `a_side` of them on each side."""
         width, height = self.size
         across, down = np.linspace(0, width - 1, a_side), np.linspace(0, height - 1, a_side)
         top, right = np.c_[across, 0 * across], np.c_[0 * down + width - 1, down]
@@ -109,12 +110,12 @@ class Lens(ABC):
 
     @property
     def focal_length_px(self) -> float:
-        """The horizontal one."""
+        """Horizontal focal length."""
         return float(self.matrix[0, 0])
 
     @property
     def relative_size(self) -> float:
-        """The longer side of the picture relative to a 4K frame's: what is given in 4K pixels scales by it."""
+        """Ratio of the picture's longer side to that of a 4K frame, by which lengths in 4K pixels scale."""
         return max(self.size) / 3840
 
     @cached_property
@@ -125,7 +126,7 @@ class Lens(ABC):
         return padded
 
     def scaled(self, factor: float) -> Self:
-        """The same lens on a picture resized by `factor`, pixel centres at integers before and after."""
+        """Return the lens of a picture resized by `factor`, pixel centres at integers before and after."""
         width, height = round(self.size[0] * factor), round(self.size[1] * factor)
         matrix = self.matrix.copy()
         for axis, ratio in ((0, width / self.size[0]), (1, height / self.size[1])):
@@ -135,7 +136,7 @@ class Lens(ABC):
         return replace(self, matrix=matrix, size=(width, height), sigma=sigma)
 
     def _within_model(self, rays: Array) -> Array:
-        """Rays (..., 2), NaN beyond `largest_radius`."""
+        """Return rays (..., 2), NaN beyond `largest_radius`."""
         beyond = np.sum(rays * rays, axis=-1, keepdims=True) > self.largest_radius**2
         return np.where(beyond, np.nan, rays)
 
@@ -151,7 +152,7 @@ class Intrinsics(Lens):
     terms: ClassVar[int] = 14
 
     def undistort(self, pixels: ArrayLike, iterations: int = 20) -> Array:
-        """Pixels (..., 2) to undistorted image coordinates at depth 1 (..., 2), by Newton's method from a table.
+        """Return undistorted image coordinates (..., 2) at depth 1 of pixels (..., 2), by Newton's method from a table.
 
         NaN where no ray of the model ends at the pixel.
         """
@@ -160,7 +161,7 @@ class Intrinsics(Lens):
         rays = (target - self.matrix[:2, 2]) @ np.linalg.inv(linear).T
         rays = self._pulled_back(rays * self._undistorted_scale(np.linalg.norm(rays, axis=-1))[..., None])
         for _ in range(iterations):
-            jacobian, miss = self.slopes(rays), target - self.distort(rays)
+            jacobian, miss = self.jacobian(rays), target - self.distort(rays)
             determinant = jacobian[..., 0, 0] * jacobian[..., 1, 1] - jacobian[..., 0, 1] * jacobian[..., 1, 0]
             move = np.stack(
                 [
@@ -170,7 +171,7 @@ class Intrinsics(Lens):
                 axis=-1,
             )
             with np.errstate(divide="ignore", invalid="ignore"):
-                # Where the map stands still there is nowhere to go.
+                # No step where the map is stationary.
                 move = np.where(determinant[..., None] == 0, np.nan, move / determinant[..., None])
             rays = self._pulled_back(rays + move)
             if np.nanmax(np.abs(move), initial=0.0) < 1e-12:
@@ -184,7 +185,7 @@ class Intrinsics(Lens):
     def largest_radius(self) -> float:
         """Undistorted radius (at depth 1) up to which the radial model grows."""
         k1, k2, _, _, k3, k4, k5, k6 = self.coefficients[:8]
-        # Of a long lens the whole picture lies within some thousandths.
+        # The whole picture of a long lens lies within some thousandths.
         radii = np.concatenate([[0.0], np.geomspace(1e-5, 0.1, 1000)[:-1], np.linspace(0.1, 20.0, 19901)])
         r2 = radii**2
         denominator = 1 + r2 * (k4 + r2 * (k5 + r2 * k6))
@@ -209,7 +210,7 @@ class Intrinsics(Lens):
         return self._tilted(*self._bent_upright(x, y))
 
     def _bent_upright(self, x: Plane, y: Plane) -> tuple[Plane, Plane]:
-        """Distorted coordinates (...) of rays (...) on a sensor that is not tilted."""
+        """Return distorted coordinates (...) of rays (...) on a sensor without tilt."""
         k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4 = self.coefficients[:12].tolist()
         r2 = x * x + y * y
         radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
@@ -223,7 +224,7 @@ class Intrinsics(Lens):
         return xd, yd
 
     def _tilted(self, xd: Plane, yd: Plane) -> tuple[Plane, Plane]:
-        """Coordinates (...) on the tilted sensor of those (...) on one that is not."""
+        """Map coordinates (...) on a sensor without tilt to those on the tilted sensor."""
         if not self._is_tilted:
             return xd, yd
         (a, b, c), (d, e, f), (g, h, i) = self.tilt.tolist()
@@ -237,7 +238,7 @@ class Intrinsics(Lens):
         radial, by_r2, _ = self._radial(r2)
         xd_by_r2, yd_by_r2 = x * by_r2 + s1 + 2 * s2 * r2, y * by_r2 + s3 + 2 * s4 * r2
         aside = 2 * (p1 * x + p2 * y)
-        slopes = np.stack(
+        jacobian = np.stack(
             [
                 radial + 2 * x * xd_by_r2 + 2 * p1 * y + 6 * p2 * x,
                 2 * y * xd_by_r2 + aside,
@@ -246,7 +247,7 @@ class Intrinsics(Lens):
             ],
             axis=-1,
         )
-        return self._on_tilted(x, y, slopes.reshape(*x.shape, 2, 2))
+        return self._on_tilted(x, y, jacobian.reshape(*x.shape, 2, 2))
 
     def _bent_by_terms(self, rays: Array) -> Array:
         x, y = np.moveaxis(self._within_model(rays), -1, 0)
@@ -256,35 +257,35 @@ class Intrinsics(Lens):
         return self._on_tilted(x, y, np.stack([by_k1, by_k1 * r2[..., None]], axis=-1))
 
     def _radial(self, r2: Array) -> tuple[Array, Array, Array]:
-        """Of rays of squared radius `r2` (...): the radial factor, its derivative by `r2`, and its denominator."""
+        """Return radial factor, its derivative by `r2`, and its denominator at squared radius `r2` (...)."""
         k1, k2, _, _, k3, k4, k5, k6 = self.coefficients[:8].tolist()
         denominator = 1 + r2 * (k4 + r2 * (k5 + r2 * k6))
         radial = (1 + r2 * (k1 + r2 * (k2 + r2 * k3))) / denominator
         by_r2 = k1 + r2 * (2 * k2 + r2 * 3 * k3) - radial * (k4 + r2 * (2 * k5 + r2 * 3 * k6))
         return radial, by_r2 / denominator, denominator
 
-    def _on_tilted(self, x: Array, y: Array, slopes: Array) -> Array:
-        """Slopes (..., 2, n) of distorted coordinates of rays (...) as they are on the tilted sensor."""
+    def _on_tilted(self, x: Array, y: Array, jacobian: Array) -> Array:
+        """Map a Jacobian (..., 2, n) of distorted coordinates of rays (...) to the tilted sensor."""
         if not self._is_tilted:
-            return slopes
+            return jacobian
         xd, yd = self._bent_upright(x, y)
         there = np.stack(self._tilted(xd, yd), axis=-1)
         depth = self.tilt[2, 0] * xd + self.tilt[2, 1] * yd + self.tilt[2, 2]
         by_upright = (self.tilt[:2, :2] - there[..., None] * self.tilt[2, :2]) / depth[..., None, None]
-        return by_upright @ slopes
+        return by_upright @ jacobian
 
     @property
     def _is_tilted(self) -> bool:
         return bool(self.coefficients[12:].any())
 
     def _pulled_back(self, rays: Array) -> Array:
-        """Rays (..., 2) pulled back to where the radial model still grows: Newton must not jump over its end."""
+        """Return rays (..., 2) limited to where the radial model grows: Newton must not jump over its end."""
         radius = np.linalg.norm(rays, axis=-1, keepdims=True)
         limit = 0.9999 * self.largest_radius
         return np.where(radius > limit, rays * (limit / np.maximum(radius, max(limit, 1e-12))), rays)
 
     def _undistorted_scale(self, distorted_radius: Array) -> Array:
-        """Ratio of undistorted to distorted radius by the radial terms alone: a start for Newton."""
+        """Return the ratio of undistorted to distorted radius by the radial terms alone, to start Newton's method."""
         radii = np.linspace(1e-6, min(self.largest_radius, 20.0), 4000)
         radial, _, _ = self._radial(radii**2)
         return np.interp(distorted_radius, radii * radial, radii) / np.maximum(distorted_radius, 1e-6)
@@ -301,7 +302,7 @@ class Fisheye(Lens):
     terms: ClassVar[int] = 4
 
     def undistort(self, pixels: ArrayLike, iterations: int = 6) -> Array:
-        """Pixels (..., 2) to undistorted image coordinates at depth 1 (..., 2), by Newton's method from a table.
+        """Return undistorted image coordinates (..., 2) at depth 1 of pixels (..., 2), by Newton's method from a table.
 
         NaN where no ray of the model ends at the pixel.
         """
@@ -312,7 +313,7 @@ class Fisheye(Lens):
         angle = np.interp(distorted, self._distorted_angle(table), table)
         for _ in range(iterations):
             # At its very end the model may stand still.
-            step = (distorted - self._distorted_angle(angle)) / np.maximum(self._angle_slope(angle), 1e-6)
+            step = (distorted - self._distorted_angle(angle)) / np.maximum(self._angle_derivative(angle), 1e-6)
             angle = np.clip(angle + step, 0.0, self._largest_angle)
         known = np.abs(distorted - self._distorted_angle(angle)) * linear[0, 0] < 1e-3
         scale = np.where(distorted > 1e-9, np.tan(angle) / np.maximum(distorted, 1e-9), 1.0)
@@ -325,7 +326,7 @@ class Fisheye(Lens):
 
     @cached_property
     def _largest_angle(self) -> float:
-        """Up to which angle (rad) the model grows; `WIDEST_FISHEYE_RAD` at most."""
+        """Largest angle (rad) up to which the model grows, at most `WIDEST_FISHEYE_RAD`."""
         angles = np.linspace(0.0, WIDEST_FISHEYE_RAD, 8901)
         growing = np.diff(self._distorted_angle(angles)) > 0
         return float(angles[-1] if growing.all() else angles[np.argmin(growing)])
@@ -335,8 +336,8 @@ class Fisheye(Lens):
         t2 = angle * angle
         return angle * (1 + t2 * (k1 + t2 * (k2 + t2 * (k3 + t2 * k4))))
 
-    def _angle_slope(self, angle: Array) -> Array:
-        """The derivative of `_distorted_angle`."""
+    def _angle_derivative(self, angle: Array) -> Array:
+        """Return the derivative of `_distorted_angle`."""
         k1, k2, k3, k4 = self.coefficients.tolist()
         t2 = angle * angle
         return 1 + t2 * (3 * k1 + t2 * (5 * k2 + t2 * (7 * k3 + t2 * 9 * k4)))
@@ -348,14 +349,14 @@ class Fisheye(Lens):
         return x * scale, y * scale
 
     def _scale(self, radius: Plane, angle: Plane) -> Plane:
-        """Ratio (...) of the distorted radius to the undistorted one."""
+        """Return the ratio (...) of distorted to undistorted radius."""
         # On the axis it is 1, and this far off it still is.
         return np.where(radius > 1e-6, self._distorted_angle(angle) / np.maximum(radius, 1e-6), 1)
 
     def _bent_by_ray(self, rays: Array) -> Array:
         radius, angle, outwards = self._polar(rays)
         across = self._scale(radius, angle)[..., None, None]
-        along = (self._angle_slope(angle) / (1 + radius * radius))[..., None, None]
+        along = (self._angle_derivative(angle) / (1 + radius * radius))[..., None, None]
         return across * np.eye(2) + (along - across) * outwards[..., :, None] * outwards[..., None, :]
 
     def _bent_by_terms(self, rays: Array) -> Array:
@@ -364,7 +365,7 @@ class Fisheye(Lens):
         return np.stack([by_k1, by_k1 * (angle * angle)[..., None]], axis=-1)
 
     def _polar(self, rays: Array) -> tuple[Array, Array, Array]:
-        """Of rays (..., 2): the radius (...), the angle (...) off the axis, and the direction (..., 2), 0 on the axis.
+        """Return radius (...), angle (...) off the axis and direction (..., 2), 0 on the axis, of rays (..., 2).
 
         NaN beyond `largest_radius`.
         """

@@ -1,4 +1,4 @@
-"""Numbers that a calibration takes for known and that may be wrong: those of each lens, and of the field."""
+"""Parameters that a calibration takes for known and that may be wrong: of each lens, and of the field."""
 
 from __future__ import annotations
 
@@ -11,53 +11,42 @@ import numpy as np
 
 from worker.calibration.geometry.camera import Array, Camera
 from worker.calibration.geometry.field import Field, LinePoints
-from worker.calibration.geometry.lens import LENS_NUMBERS, Lens
+from worker.calibration.geometry.lens import LENS_PARAMETERS, Lens
 
-FIELD_STEP_M = 1e-3
 BOARD_FOCAL, BOARD_ASPECT, BOARD_RADIAL = 3e-4, 2e-4, 5e-4
-"""What the photos of a good board leave uncertain: part of the focal length, ratio of the two, k1 and k2; and of the
-principal point a pixel of a 4K frame."""
+"""Sigma after photos of a good board: of the focal length as a part of it, of the ratio of the two, of k1 and k2; and
+of the principal point a pixel of a 4K frame."""
 HEAT_FOCAL = 3e-4
-"""What day and night do to a focal length since the photos of the board, part of it: metal grows by 23 millionths a
+"""Sigma of a focal length by day and night since the photos of the board, part of it: metal grows by 23 millionths a
 kelvin, and summer noon and a winter's night are 13 K to either side of the mean."""
-FREE_FOCAL_LENGTH, FREE_RIDGE_M = 0.005, 0.3
-"""How far off what is left free may be: a focus ring that was touched, a crown of up to half a metre."""
-FREE_FOCAL, FREE_CENTRE, FREE_BEND = 0.1, 20 / 3840, 0.05
-"""How far off the numbers of a lens may be that is found with a pose: part of the focal length, part of the frame's
-width, and k1 and k2 at half the width of the frame."""
-TAPE = 3e-4
-"""Prior sigma of length, width and diagonal, part of each: a tape that is pulled with care. From the 3 cm that were
-taken for a football pitch of 105 m; no bench has chosen it."""
-LEVELLED_M = 0.02
-"""Prior sigma of the height of a ridge: a level over half a pitch. No bench has chosen it."""
-FREE_LENGTH_M, FREE_WIDTH_M = 5.0, 5.0
-"""Pitches for matches are 90 to 120 m long and 45 to 90 m wide, and mostly near 105 m and 68 m."""
+FREE_RIDGE_M = 0.3
+"""Prior sigma of a free ridge: a crown of up to half a metre."""
 
 
 @dataclass(frozen=True)
 class LensParameter:
-    """A number of the lens of camera number `camera`. `expected`: how far off it may be."""
+    """Parameter of the lens of camera number `camera`. `expected`: its prior sigma."""
 
     camera: int
     name: str
     expected: float
 
     def applied(self, cameras: Sequence[Camera], pitch: Field, by: float) -> tuple[list[Camera], Field]:
-        """Cameras and pitch with this number changed."""
+        """Return cameras and field with this parameter changed."""
         changed = list(cameras)
         changed[self.camera] = self.changed(changed[self.camera], by)
         return changed, pitch
 
     def changed(self, camera: Camera, by: float) -> Camera:
-        """The camera with this number changed."""
-        numbers = lens_numbers(camera.intrinsics)
-        numbers[LENS_NUMBERS.index(self.name)] += by
-        return camera.with_lens(with_lens_numbers(camera.intrinsics, numbers))
+        """Return the camera with this parameter changed."""
+        numbers = lens_values(camera.intrinsics)
+        numbers[LENS_PARAMETERS.index(self.name)] += by
+        return camera.with_lens(with_lens_values(camera.intrinsics, numbers))
 
 
 @dataclass(frozen=True)
 class FieldParameter:
-    """A number of the field, metres. `expected`: how far off it may be.
+    """Parameter of the field, metres. `expected`: its prior sigma.
 
     `shift` (N, 3): how the line points move, metres per metre.
     """
@@ -72,7 +61,7 @@ class FieldParameter:
         return self if lines is self.lines else replace(self, shift=self._shift_of(pitch, lines), lines=lines)
 
     def applied(self, cameras: Sequence[Camera], pitch: Field, by: float) -> tuple[list[Camera], Field]:
-        """Cameras and pitch with this number changed: only measures can be solved for."""
+        """Return cameras and field with this parameter changed; only measures can be solved for."""
         raise NotImplementedError(self.name)
 
     def _shift_of(self, pitch: Field, lines: LinePoints) -> Array:
@@ -81,26 +70,27 @@ class FieldParameter:
 
 @dataclass(frozen=True)
 class FieldMeasure(FieldParameter):
-    """A measure that a field can have otherwise: `read` and `write` it of a pitch."""
+    """Measure that a field can have otherwise, with functions that `read` and `write` it."""
 
     read: Callable[[Field], float]
     write: Callable[[Field, float], Field]
 
     def applied(self, cameras: Sequence[Camera], pitch: Field, by: float) -> tuple[list[Camera], Field]:
-        """Cameras and pitch with this measure changed, as far as it can be."""
+        """Return cameras and field with this measure changed, as far as it can be."""
         return list(cameras), self.write(pitch, self.read(pitch) + by)
 
     def _shift_of(self, pitch: Field, lines: LinePoints) -> Array:
+        field_step_m = 1e-3
         ahead, behind = (
             self.write(pitch, self.read(pitch) + step).same_line_points(lines).position
-            for step in (FIELD_STEP_M, -FIELD_STEP_M)
+            for step in (field_step_m, -field_step_m)
         )
-        return np.asarray((ahead - behind) / (2 * FIELD_STEP_M), dtype=float)
+        return np.asarray((ahead - behind) / (2 * field_step_m), dtype=float)
 
 
 @dataclass(frozen=True)
 class FieldSkew(FieldParameter):
-    """The skew of a field out of square: each touchline is shifted along itself by it, the far one to the right.
+    """Skew of a field out of square: the shift of each touchline along itself, the far one to the right.
 
     No venue can have one: it is named, and explains what else would bend the lenses.
     """
@@ -112,15 +102,15 @@ class FieldSkew(FieldParameter):
 Parameter = LensParameter | FieldParameter
 
 
-def lens_numbers(lens: Lens) -> Array:
-    """`LENS_NUMBERS` (6,) of a lens."""
+def lens_values(lens: Lens) -> Array:
+    """Return `LENS_PARAMETERS` (6,) of a lens."""
     (fx, _, cx), (_, fy, cy) = lens.matrix[:2].tolist()
     k1, k2 = (*lens.distortion.tolist(), 0.0, 0.0)[:2]
     return np.array([fx, cx, cy, fy / fx, k1, k2])
 
 
-def with_lens_numbers(lens: Lens, numbers: Array) -> Lens:
-    """The lens with other `LENS_NUMBERS` (6,)."""
+def with_lens_values(lens: Lens, numbers: Array) -> Lens:
+    """Return the lens with other `LENS_PARAMETERS` (6,)."""
     fx, cx, cy, aspect, k1, k2 = numbers.tolist()
     matrix = np.array([[fx, lens.matrix[0, 1], cx], [0.0, aspect * fx, cy], [0.0, 0.0, 1.0]])
     distortion = lens.distortion
@@ -130,13 +120,12 @@ def with_lens_numbers(lens: Lens, numbers: Array) -> Lens:
 
 
 def with_lens_changed(camera: Camera, changes: Array) -> Camera:
-    """The camera with `LENS_NUMBERS` changed by (6,)."""
-    return camera.with_lens(with_lens_numbers(camera.intrinsics, lens_numbers(camera.intrinsics) + changes))
+    """Return the camera with `LENS_PARAMETERS` changed by (6,)."""
+    return camera.with_lens(with_lens_values(camera.intrinsics, lens_values(camera.intrinsics) + changes))
 
 
 def lens_parameters(cameras: Sequence[Camera]) -> list[LensParameter]:
-    """The numbers of each lens, as uncertain as the lens says (`Lens.sigma`), or as a good board leaves them, and
-    the focal length as heat moves it besides."""
+    """Return the parameters of each lens by its own sigma (`Lens.sigma`) or a good board's, and with heat."""
     return [
         replace(p, expected=hypot(p.expected, HEAT_FOCAL * cameras[p.camera].intrinsics.focal_length_px))
         if p.name == "focal_length_px"
@@ -146,7 +135,7 @@ def lens_parameters(cameras: Sequence[Camera]) -> list[LensParameter]:
 
 
 def lens_parameters_without_heat(cameras: Sequence[Camera]) -> list[LensParameter]:
-    """The same on the day of the photos of the board."""
+    """Return the parameters of each lens as on the day of the photos of the board, without heat."""
     found: list[LensParameter] = []
     for number, camera in enumerate(cameras):
         lens = camera.intrinsics
@@ -161,42 +150,50 @@ def lens_parameters_without_heat(cameras: Sequence[Camera]) -> list[LensParamete
             "k1": known.get("k1", BOARD_RADIAL),
             "k2": known.get("k2", BOARD_RADIAL),
         }
-        found += [LensParameter(number, name, expected[name]) for name in LENS_NUMBERS]
+        found += [LensParameter(number, name, expected[name]) for name in LENS_PARAMETERS]
     return found
 
 
 def _focal_sigma(lens: Lens, sigma: Mapping[str, float]) -> float:
-    """Of fx, with which fy changes: by what is known of either, the worse of both."""
+    """Return the sigma of fx, with which fy changes: the worse of what is known of either."""
     fx, fy = float(lens.matrix[0, 0]), float(lens.matrix[1, 1])
     scales = {"fx": 1.0, "fy": fx / fy}
     return max((sigma[name] * scale for name, scale in scales.items() if name in sigma), default=BOARD_FOCAL * fx)
 
 
 def free_lens_sigma(lens: Lens) -> dict[str, float]:
-    """Return how far off, by the names of `Lens.sigma`, the numbers of a lens may be that nothing but lines tells."""
+    """Return the sigma, by the names of `Lens.sigma`, of a lens that only lines determine."""
     half_width = lens.size[0] / (2 * lens.focal_length_px)
-    centre = FREE_CENTRE * lens.size[0]
+    # Twenty pixels of a 4K frame.
+    centre = 20 / 3840 * lens.size[0]
+    # Prior sigma of k1 and k2, at half the width of the frame, of a lens that is found with a pose.
+    free_bend = 0.05
+    # Relative sigma of the focal length.
     return {
-        "fx": FREE_FOCAL * lens.focal_length_px,
+        "fx": 0.1 * lens.focal_length_px,
         "cx": centre,
         "cy": centre,
-        "k1": FREE_BEND * half_width**-2,
-        "k2": FREE_BEND * half_width**-4,
+        "k1": free_bend * half_width**-2,
+        "k2": free_bend * half_width**-4,
     }
 
 
 def careful_measurement(pitch: Field) -> dict[str, float]:
-    """Return the sigma (m) of numbers of a field that were measured with care; diagonals give the right angles."""
+    """Return the sigma (m) of a field measured with care, by parameter; diagonals give the right angles."""
+    # Prior sigma of length, width and diagonal, part of each: a tape that is pulled with care. It comes from the 3 cm
+    # that were taken for a football pitch of 105 m; no bench has chosen it.
+    tape = 3e-4
+    # A level over half a field; no bench has chosen it.
     return {
-        "ridge_height_m": LEVELLED_M,
-        "length_m": TAPE * pitch.length,
-        "width_m": TAPE * pitch.width,
-        "skew_m": TAPE * hypot(pitch.length, pitch.width),
+        "ridge_height_m": 0.02,
+        "length_m": tape * pitch.length,
+        "width_m": tape * pitch.width,
+        "skew_m": tape * hypot(pitch.length, pitch.width),
     }
 
 
 def field_measures(pitch: Field) -> list[FieldMeasure]:
-    """Return the measures of a pitch, as uncertain as `Field.sigma` says or as a careful measurement leaves them."""
+    """Return the measures of a field, with the sigma of `Field.sigma` or of a careful measurement."""
     known = _known(pitch)
     return [
         _ridge_height(pitch, known["ridge_height_m"]),
@@ -206,7 +203,7 @@ def field_measures(pitch: Field) -> list[FieldMeasure]:
 
 
 def field_parameters(pitch: Field) -> list[FieldParameter]:
-    """Return the numbers of a pitch that may be wrong: its measures and its skew."""
+    """Return the parameters of a field that may be wrong: its measures and its skew."""
     skew = FieldSkew("skew_m", _known(pitch)["skew_m"])
     return [*field_measures(pitch), skew.around(pitch, pitch.line_points())]
 
@@ -216,27 +213,29 @@ def _known(pitch: Field) -> dict[str, float]:
 
 
 def with_focal_length(camera: Camera, longer_px: float) -> Camera:
-    """The camera with a focal length that is so much longer."""
-    return with_lens_changed(camera, longer_px * np.eye(len(LENS_NUMBERS))[0])
+    """Return the camera with its focal length increased by `longer_px`."""
+    return with_lens_changed(camera, longer_px * np.eye(len(LENS_PARAMETERS))[0])
 
 
 def free_focal_lengths(cameras: Sequence[Camera]) -> list[LensParameter]:
-    """The focal length of each camera, to be found along with its pose."""
+    """Return the focal length of each camera, to be found along with its pose."""
     lengths = [p for p in lens_parameters(cameras) if p.name == "focal_length_px"]
+    # A focus ring that was touched.
     return [
-        replace(p, expected=FREE_FOCAL_LENGTH * camera.intrinsics.focal_length_px)
+        replace(p, expected=0.005 * camera.intrinsics.focal_length_px)
         for p, camera in zip(lengths, cameras, strict=True)
     ]
 
 
 def free_ridge(pitch: Field) -> list[FieldMeasure]:
-    """The height of the ridge, to be found along with the poses."""
+    """Return the height of the ridge, to be found along with the poses."""
     return [_ridge_height(pitch, FREE_RIDGE_M)]
 
 
 def free_field(pitch: Field) -> list[FieldMeasure]:
-    """Length, width and height of a field of which next to nothing is known."""
-    return [_length(pitch, FREE_LENGTH_M), _width(pitch, FREE_WIDTH_M), _ridge_height(pitch, FREE_RIDGE_M)]
+    """Return length, width and ridge height of a field of which next to nothing is known."""
+    # Fields for matches are 90 to 120 m long and 45 to 90 m wide, and mostly near 105 m and 68 m.
+    return [_length(pitch, 5.0), _width(pitch, 5.0), _ridge_height(pitch, FREE_RIDGE_M)]
 
 
 def _ridge_height(pitch: Field, expected: float) -> FieldMeasure:
@@ -247,7 +246,7 @@ def _ridge_height(pitch: Field, expected: float) -> FieldMeasure:
 
 
 def _length(pitch: Field, expected: float) -> FieldMeasure:
-    """Of the pitch; its ridge keeps its own."""
+    """Return the length of the field; its ridge keeps its own."""
     measure = FieldMeasure("length_m", expected, lambda one: one.length, lambda one, now: one.resized(length=now))
     return measure.around(pitch, pitch.line_points())
 

@@ -1,4 +1,4 @@
-"""Whether a pose is one from which somebody films a field: upright, above it and not far away."""
+"""Plausible poses for filming a field: upright, above it and not far away."""
 
 from __future__ import annotations
 
@@ -7,18 +7,16 @@ import math
 from worker.calibration.geometry.camera import Pose
 
 HIGHEST_M, FARTHEST_M = 200.0, 500.0
-"""Above the field, and from its centre."""
-STEEPEST_ROLL_DEG = 60.0
-STRAIGHT_DOWN = 0.95
-"""Component of the view along the vertical from which a picture has no upright."""
+"""Limits above the field, and from its centre."""
 
 
 def films_a_field(pose: Pose) -> bool:
-    """Whether a camera of this pose could be one that films a field; what it sees there is not asked."""
+    """True if a camera of this pose could film a field, whatever it sees there."""
     x, y, z = pose.position
     if not (0 < z <= HIGHEST_M and math.hypot(x, y) <= FARTHEST_M):
         return False
     right, down, forward = pose.matrix[:, 2]
-    if abs(forward) > STRAIGHT_DOWN:
+    # Component of the view along the vertical from which a picture has no upright.
+    if abs(forward) > 0.95:
         return bool(forward < 0)
-    return bool(-down >= math.cos(math.radians(STEEPEST_ROLL_DEG)) * math.hypot(right, down))
+    return bool(-down >= math.cos(math.radians(60.0)) * math.hypot(right, down))

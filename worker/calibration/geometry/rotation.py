@@ -9,7 +9,7 @@ from worker.calibration.geometry.arrays import Array
 
 
 def rotation_matrices(vectors: ArrayLike) -> Array:
-    """Rodrigues: rotation vectors (..., 3) in radians to matrices (..., 3, 3)."""
+    """Return matrices (..., 3, 3) of rotation vectors (..., 3), rad (Rodrigues)."""
     v = np.asarray(vectors, dtype=float)
     angle = np.linalg.norm(v, axis=-1)[..., None, None]
     cross = cross_matrices(v)
@@ -20,7 +20,7 @@ def rotation_matrices(vectors: ArrayLike) -> Array:
 
 
 def rotation_vectors(matrices: ArrayLike) -> Array:
-    """Inverse Rodrigues: matrices (..., 3, 3) to vectors (..., 3) of length 0..pi.
+    """Return rotation vectors (..., 3) of length 0..pi of matrices (..., 3, 3) (inverse Rodrigues).
 
     Goes through the unit quaternion of largest component, which stays exact near 0 and near pi.
     """
@@ -45,13 +45,13 @@ def rotation_vectors(matrices: ArrayLike) -> Array:
 
 
 def cross_matrices(vectors: Array) -> Array:
-    """Matrices (..., 3, 3) of the cross product with vectors (..., 3)."""
+    """Return matrices (..., 3, 3) of the cross product with vectors (..., 3)."""
     x, y, z = np.moveaxis(vectors, -1, 0)
     zero = np.zeros_like(x)
     return np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(*vectors.shape, 3)
 
 
 def rotation_angles_deg(a: ArrayLike, b: ArrayLike) -> Array:
-    """Angle in degrees of the rotation between rotation vectors (..., 3) and (..., 3)."""
+    """Return the angle in degrees of the rotation between rotation vectors (..., 3) and (..., 3)."""
     relative = rotation_matrices(a) @ np.swapaxes(rotation_matrices(b), -1, -2)
     return np.degrees(np.linalg.norm(rotation_vectors(relative), axis=-1))

@@ -1,4 +1,4 @@
-"""Which points of the markings a camera sees, and how large they are in its picture."""
+"""Visible points of the markings, and their size in a camera's picture."""
 
 from __future__ import annotations
 
@@ -7,10 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.geometry.camera import Array, Camera
+from worker.calibration.geometry.arrays import Array, take_rows
+from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.field import LinePoints
-
-STEP_M = 0.05
 
 
 @dataclass(frozen=True)
@@ -35,13 +34,14 @@ class VisibleLines:
 
     @classmethod
     def from_camera(cls, lines: LinePoints, camera: Camera) -> VisibleLines:
-        """The points that fall into the picture."""
+        """Return the line points that fall into the picture."""
         pixel = camera.project(lines.position)
         index = np.flatnonzero(camera.sees(pixel))
         lines, pixel = lines[index], pixel[index]
-        along = (camera.project(lines.position + STEP_M * lines.tangent) - pixel) / STEP_M
-        across = (camera.project(lines.position + STEP_M * lines.normal) - pixel) / STEP_M
-        up = (camera.project(lines.position + [0.0, 0.0, STEP_M]) - pixel) / STEP_M
+        step_m = 0.05
+        along = (camera.project(lines.position + step_m * lines.tangent) - pixel) / step_m
+        across = (camera.project(lines.position + step_m * lines.normal) - pixel) / step_m
+        up = (camera.project(lines.position + [0.0, 0.0, step_m]) - pixel) / step_m
         speed = np.linalg.norm(along, axis=1)
         # A line seen end-on has no direction in the picture, and a point at the rim of the lens none that is known.
         usable = np.isfinite(across + up).all(axis=1) & np.isfinite(speed) & (speed > 1e-6)
@@ -67,19 +67,10 @@ class VisibleLines:
         return len(self.points)
 
     def __getitem__(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> VisibleLines:
-        return VisibleLines(
-            self.index[chosen],
-            self.points[chosen],
-            self.pixel[chosen],
-            self.normal[chosen],
-            self.width_px[chosen],
-            self.length_px[chosen],
-            self.px_per_metre[chosen],
-            self.px_per_metre_up[chosen],
-        )
+        return take_rows(self, chosen)
 
     def thinned(self, spacing_px: float) -> VisibleLines:
-        """About one point every `spacing_px` along the lines; those kept stand for the length of those dropped."""
+        """Return about one point every `spacing_px` along the lines; each stands for the length of those dropped."""
         walked = np.cumsum(self.length_px)
         kept = np.flatnonzero(np.diff(np.floor(walked / spacing_px), prepend=-1.0) > 0)
         few = self[kept]

@@ -1,1 +1,1 @@
-"""What is kept of the nights of a camera, so that no job is judged as if it were the first."""
+"""Memory of a camera's nights, so that no job is judged as if it were the first."""

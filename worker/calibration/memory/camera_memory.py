@@ -1,4 +1,4 @@
-"""The memory of a camera: what it was told to be, its first nights, its last ones, and how it looked before.
+"""Memory of a camera: its stored pose and lens, its first nights, its last ones, and how it looked before.
 
 The anchor does not follow: a lens that creeps by a hair a night is compared with what it was in the first nights, and
 not with what it was yesterday. Only accepted jobs are remembered.
@@ -21,22 +21,18 @@ from worker.calibration.geometry.field import LinePoints
 from worker.calibration.memory.epoch import Epoch, camera_from_json, camera_to_json
 
 FORMAT = 1
-WIND_RAD, WIND_M = 0.003, 0.03
-"""How far wind and heat hold a camera from where its mount stands, per axis, at the moment of a frame."""
-WIND = np.array([WIND_RAD] * 3 + [WIND_M] * 3)
+WIND = np.array([0.003] * 3 + [0.03] * 3)
 ANCHOR_JOBS = 8
-"""Jobs that make up the anchor."""
-MOST_EARLIER, FEWEST_JOBS = 2, 4
-"""Earlier epochs that are kept, of so many jobs at least: another way of looking tells lens and ground apart."""
+"""Number of jobs that make up the anchor."""
 
 
 @dataclass(frozen=True)
 class AcceptedJob:
-    """What an accepted job hands to the memory of a camera.
+    """Result of an accepted job, as the memory of a camera takes it.
 
-    `found`: the camera with its accepted pose; `measured`: its line measurements, of the `lines` of the pitch; `at`:
+    `found`: the camera with its accepted pose; `measured`: its line measurements, of the `lines` of the field; `at`:
     when the frames were taken, None if not known; `repainted_markings`: numbers of the markings that lie elsewhere than
-    remembered; `frames`: the fingerprint of the job's frames; `zoomed`: whether the focal length has surely changed
+    remembered; `frames`: the fingerprint of the job's frames; `zoomed`: True if the focal length has surely changed
     since the first nights.
     """
 
@@ -50,17 +46,17 @@ class AcceptedJob:
 
     @property
     def for_epoch(self) -> tuple[Camera, Measurements, LinePoints, datetime | None]:
-        """What an epoch takes of the job."""
+        """Arguments of `Epoch.from_job` and `Epoch.joined`."""
         return self.found, self.measured, self.lines, self.at
 
     def without(self, markings: Sequence[int]) -> AcceptedJob:
-        """The job without the measurements of some markings."""
+        """Return the job without the measurements of some markings."""
         return replace(self, measured=self.measured[~np.isin(self.measured.points.marking, markings)])
 
 
 @dataclass(frozen=True)
 class CameraMemory:
-    """The memory of one camera: where it was stored at first, and the epochs of its accepted jobs.
+    """Memory of one camera: its first stored pose, and the epochs of its accepted jobs.
 
     `origin`: the camera as it was stored before its first job; `anchor`: the first jobs, `recent`: those since, and
     `earlier` ones that looked another way or had another lens; `repainted_markings`: numbers of the markings that have
@@ -78,53 +74,57 @@ class CameraMemory:
 
     @classmethod
     def from_first_job(cls, stored: Camera, job: AcceptedJob) -> CameraMemory:
-        """The memory of the first accepted job, which found a camera that was `stored` before."""
-        told = job.without(job.repainted_markings).for_epoch
-        return cls(stored, Epoch.from_job(*told), None, (), job.repainted_markings, fingerprint(job.lines), job.frames)
+        """Return the memory of the first accepted job, which found a camera that was `stored` before."""
+        arguments = job.without(job.repainted_markings).for_epoch
+        return cls(
+            stored, Epoch.from_job(*arguments), None, (), job.repainted_markings, fingerprint(job.lines), job.frames
+        )
 
     def after(self, job: AcceptedJob) -> CameraMemory:
-        """The memory with one more accepted job; the same frames sent again say nothing new."""
+        """Return the memory with one more accepted job; the same frames sent again say nothing new."""
         if job.frames == self.frames:
             return self
         kept = replace(self.aware_of(job.repainted_markings, job.lines), frames=job.frames)
-        told = job.without(kept.repainted_markings).for_epoch
+        arguments = job.without(kept.repainted_markings).for_epoch
         if kept.takes_for_anchor(job):
-            return replace(kept, anchor=kept.anchor.joined(*told))
+            return replace(kept, anchor=kept.anchor.joined(*arguments))
         if kept.recent is None:
-            return replace(kept, recent=Epoch.from_job(*told))
+            return replace(kept, recent=Epoch.from_job(*arguments))
         if kept.recent.looks_like(job.found, job.lines):
-            return replace(kept, recent=kept.recent.joined(*told))
-        before = [*kept.earlier, kept.recent] if kept.recent.jobs >= FEWEST_JOBS else list(kept.earlier)
-        return replace(kept, recent=Epoch.from_job(*told), earlier=tuple(before[-MOST_EARLIER:]))
+            return replace(kept, recent=kept.recent.joined(*arguments))
+        # A few jobs are no epoch.
+        before = [*kept.earlier, kept.recent] if kept.recent.jobs >= 4 else list(kept.earlier)
+        # Another way of looking tells lens and ground apart.
+        return replace(kept, recent=Epoch.from_job(*arguments), earlier=tuple(before[-2:]))
 
     def takes_for_anchor(self, job: AcceptedJob) -> bool:
-        """Whether a job is one of the first nights, in which camera and lens were as they were in the very first."""
+        """True if a job is one of the first nights, with camera and lens as in the very first."""
         begins = self.recent is None and self.anchor.jobs < ANCHOR_JOBS
         return begins and not job.zoomed and self.anchor.looks_like(job.found, job.lines)
 
     @property
     def epochs(self) -> list[Epoch]:
-        """All of them: the anchor, the recent one if there is one, and earlier ones."""
+        """All epochs: the anchor, the recent one if there is one, and earlier ones."""
         return [self.anchor, *([self.recent] if self.recent else []), *self.earlier]
 
     @property
     def last(self) -> Epoch:
-        """The one of the last jobs."""
+        """Epoch of the last jobs."""
         return self.recent or self.anchor
 
     @property
     def jobs(self) -> int:
-        """Of how many accepted jobs it is."""
+        """Number of accepted jobs in it."""
         return sum(epoch.jobs for epoch in self.epochs)
 
     @property
     def since(self) -> datetime | None:
-        """The middle of the first nights, which is what a change since then is counted from."""
+        """Middle of the first nights, from which changes are counted."""
         first, last = self.anchor.first, self.anchor.last
         return first if first is None or last is None else first + (last - first) / 2
 
     def aware_of(self, repainted_markings: Sequence[int] | NDArray[np.intp], lines: LinePoints) -> CameraMemory:
-        """The memory of a field that has some markings elsewhere: what it knew of them is forgotten."""
+        """Return the memory without what it knew of markings that were painted elsewhere."""
         aside = np.union1d(self.repainted_markings, repainted_markings).astype(int)
         if len(aside) == len(self.repainted_markings):
             return self
@@ -138,7 +138,7 @@ class CameraMemory:
         )
 
     def to_json(self) -> dict[str, Any]:
-        """The memory as a JSON object, about 10 kB an epoch."""
+        """Return the memory as a JSON object, about 10 kB an epoch."""
         return {
             "format": FORMAT,
             "lines": self.lines,
@@ -151,19 +151,19 @@ class CameraMemory:
         }
 
     @classmethod
-    def from_json(cls, told: Mapping[str, Any]) -> CameraMemory | None:
-        """The memory that `to_json` wrote; None for one that another release wrote otherwise or that cannot be read."""
-        if told.get("format") != FORMAT:
+    def from_json(cls, document: Mapping[str, Any]) -> CameraMemory | None:
+        """Return the memory that `to_json` wrote; None for one of another format or that cannot be read."""
+        if document.get("format") != FORMAT:
             return None
         try:
             return cls(
-                camera_from_json(told["origin"]),
-                Epoch.from_json(told["anchor"]),
-                None if told["recent"] is None else Epoch.from_json(told["recent"]),
-                tuple(Epoch.from_json(epoch) for epoch in told["earlier"]),
-                tuple(told["aside"]),
-                told["lines"],
-                told["frames"],
+                camera_from_json(document["origin"]),
+                Epoch.from_json(document["anchor"]),
+                None if document["recent"] is None else Epoch.from_json(document["recent"]),
+                tuple(Epoch.from_json(epoch) for epoch in document["earlier"]),
+                tuple(document["aside"]),
+                document["lines"],
+                document["frames"],
             )
         except (KeyError, TypeError, ValueError):
             # A camera without its memory can still be calibrated, and begins another one.
@@ -171,12 +171,12 @@ class CameraMemory:
 
 
 def fingerprint(lines: LinePoints) -> str:
-    """Names the line points that the numbers of a memory are about: another field has another one."""
+    """Return a digest of the line points that a memory is about: another field has another one."""
     return hashlib.sha256(np.round(lines.position, 4).tobytes()).hexdigest()[:16]
 
 
 def fingerprint_of_frames(frames: Sequence[Frame]) -> str:
-    """Names the frames of a job by every eighth of their rows and columns: no two nights have the same noise."""
+    """Return a digest of a job's frames by every eighth row and column: no two nights have the same noise."""
     digest = hashlib.blake2b(digest_size=8)
     for frame in frames:
         digest.update(np.ascontiguousarray(frame[::8, ::8]).tobytes())
@@ -184,6 +184,6 @@ def fingerprint_of_frames(frames: Sequence[Frame]) -> str:
 
 
 def memories_of_field(memories: Sequence[CameraMemory | None], lines: LinePoints) -> list[CameraMemory | None]:
-    """The memories that are about these line points, None in place of any other."""
+    """Return the memories that are about these line points, None in place of any other."""
     here = fingerprint(lines)
     return [memory if memory is not None and memory.lines == here else None for memory in memories]

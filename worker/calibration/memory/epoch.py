@@ -1,4 +1,4 @@
-"""An epoch: the mean of the line measurements of several accepted jobs, during which a camera stood still.
+"""Epoch: the mean of the line measurements of several accepted jobs, during which a camera stood still.
 
 It is kept as measurements and not as beliefs: what it says of lens, ground and paint is asked anew in every job,
 together with the lines of tonight, so that no error of an earlier answer confirms itself.
@@ -24,21 +24,20 @@ from worker.calibration.geometry.visibility import VisibleLines
 from worker.calibration.robust import tukey_weights
 
 MOST_JOBS = 100
-"""The mean of a point forgets as if it were of so many jobs at most."""
-LEAST_TRUST = 0.5
-SAME_PLACE_PX = 1.0
-"""A point that is farther from its mean, in pixels of a 4K frame, is not the same paint: somebody stands on it."""
+"""Most jobs as whose mean an older mean counts."""
 SAME_VIEW_PX = 60.0
-"""A camera whose picture of the field has moved by less, in pixels of a 4K frame, still looks the same way."""
+"""Mean move of a camera's picture of the field, in pixels of a 4K frame, up to which it looks the same way."""
 PX_STEP = 1e-3
-"""Offsets are written to a thousandth of a pixel."""
+"""Step in which offsets are written."""
 
 
 @dataclass(frozen=True)
 class Epoch:
-    """`camera`: the mean pose, and the lens that the poses were found with; `index` (M,): line points; `offset` (M,)
-    px: how far beside where that camera expects them, along their normals, they were measured on average; `count`
-    (M,): in how many jobs; `jobs` in all, from `first` to `last` (None: their time is not known).
+    """Mean line measurements of `jobs` jobs, from `first` to `last` (None: their time is not known).
+
+    `camera`: the mean pose, and the lens with which the poses were found; `index` (M,): line points; `offset` (M,) px:
+    their mean measured offset from where that camera expects them, along their normals; `count` (M,): number of jobs
+    that measured each.
     """
 
     camera: Camera
@@ -51,17 +50,19 @@ class Epoch:
 
     @classmethod
     def from_job(cls, camera: Camera, measured: Measurements, lines: LinePoints, at: datetime | None) -> Epoch:
-        """The epoch of one job, whose answer was `camera`; `lines` of its pitch."""
+        """Return the epoch of one job, whose answer was `camera`; `lines` of its field."""
         index, offset = _trusted(camera, measured, lines)
         return cls(camera, index, offset, np.ones(len(index)), 1, at, at)
 
     def joined(self, camera: Camera, measured: Measurements, lines: LinePoints, at: datetime | None) -> Epoch:
-        """The same with one more job, whose answer was `camera` with the same lens."""
+        """Return the epoch with one more job, whose answer was `camera` with the same lens."""
         new, value = _trusted(camera, measured, lines)
         count = np.zeros(len(lines))
         offset = np.zeros(len(lines))
         count[self.index], offset[self.index] = self.count, self.offset
-        near = np.abs(value - offset[new]) <= SAME_PLACE_PX * camera.intrinsics.relative_size
+        # Largest distance of a point from its mean, in pixels of a 4K frame: a farther one is not the same paint,
+        # somebody stands on it.
+        near = np.abs(value - offset[new]) <= camera.intrinsics.relative_size
         taken = near | (count[new] == 0)
         new, value = new[taken], value[taken]
         count[new] = np.minimum(count[new], MOST_JOBS - 1) + 1
@@ -71,12 +72,12 @@ class Epoch:
         return Epoch(mean, index, offset[index], count[index], self.jobs + 1, self.first, at or self.last)
 
     def without(self, gone: NDArray[np.intp]) -> Epoch:
-        """The same without some line points."""
-        left = ~np.isin(self.index, gone)
-        return replace(self, index=self.index[left], offset=self.offset[left], count=self.count[left])
+        """Return the epoch without some line points."""
+        kept = ~np.isin(self.index, gone)
+        return replace(self, index=self.index[kept], offset=self.offset[kept], count=self.count[kept])
 
     def measurements(self, lines: LinePoints) -> Measurements:
-        """What `camera` measured on average of the `lines`."""
+        """Return the mean measurements of the `lines` by `camera`."""
         seen = VisibleLines.from_camera(lines, self.camera)
         seen = seen[np.isin(seen.index, self.index)]
         where = np.searchsorted(self.index, seen.index)
@@ -86,16 +87,16 @@ class Epoch:
         return Measurements(seen.index, seen.points, pixel, seen.normal, *sizes, trust, jobs=self.count[where])
 
     def looks_like(self, camera: Camera, lines: LinePoints) -> bool:
-        """Whether a camera has the same lens and looks the same way."""
-        ours, theirs = self.camera.intrinsics, camera.intrinsics
-        same_lens = np.array_equal(ours.matrix, theirs.matrix) and np.array_equal(ours.distortion, theirs.distortion)
+        """True if a camera has the same lens and looks the same way."""
+        own, other = self.camera.intrinsics, camera.intrinsics
+        same_lens = np.array_equal(own.matrix, other.matrix) and np.array_equal(own.distortion, other.distortion)
         places = lines.position[self.index]
         apart = np.linalg.norm(camera.project(places) - self.camera.project(places), axis=1)
         apart = apart[np.isfinite(apart)]
-        return bool(same_lens and len(apart) and apart.mean() <= SAME_VIEW_PX * ours.relative_size)
+        return bool(same_lens and len(apart) and apart.mean() <= SAME_VIEW_PX * own.relative_size)
 
     def to_json(self) -> dict[str, Any]:
-        """The epoch as a JSON object."""
+        """Return the epoch as a JSON object."""
         return {
             "camera": camera_to_json(self.camera),
             "index": _packed(self.index, "<u2"),
@@ -107,31 +108,31 @@ class Epoch:
         }
 
     @classmethod
-    def from_json(cls, told: Mapping[str, Any]) -> Epoch:
-        """What `to_json` wrote."""
+    def from_json(cls, document: Mapping[str, Any]) -> Epoch:
+        """Return the epoch that `to_json` wrote."""
         return cls(
-            camera_from_json(told["camera"]),
-            _unpacked(told["index"], "<u2").astype(np.intp),
-            _unpacked(told["offset"], "<i2") * PX_STEP,
-            _unpacked(told["count"], "<u2").astype(float),
-            int(told["jobs"]),
-            None if told["first"] is None else datetime.fromisoformat(told["first"]),
-            None if told["last"] is None else datetime.fromisoformat(told["last"]),
+            camera_from_json(document["camera"]),
+            _unpacked(document["index"], "<u2").astype(np.intp),
+            _unpacked(document["offset"], "<i2") * PX_STEP,
+            _unpacked(document["count"], "<u2").astype(float),
+            int(document["jobs"]),
+            None if document["first"] is None else datetime.fromisoformat(document["first"]),
+            None if document["last"] is None else datetime.fromisoformat(document["last"]),
         )
 
 
 def _trusted(camera: Camera, measured: Measurements, lines: LinePoints) -> tuple[NDArray[np.intp], Array]:
-    """Which line points were measured well, in order, and how far (px) beside where the camera expects them."""
+    """Return the line points that were measured well, in order, and their offsets (px) by the camera."""
     offset = measured.offset(camera, lines.position[measured.index])
     with np.errstate(invalid="ignore"):
-        good = np.isfinite(offset) & (measured.trust >= LEAST_TRUST)
+        good = np.isfinite(offset) & (measured.trust >= 0.5)
     good[good] = tukey_weights(offset[good] / measured.sigma_px[good]) > 0
     order = np.argsort(measured.index[good])
     return measured.index[good][order], offset[good][order]
 
 
 def camera_to_json(camera: Camera) -> dict[str, Any]:
-    """Pose and lens of a camera as a JSON object."""
+    """Return pose and lens of a camera as a JSON object."""
     lens = camera.intrinsics
     return {
         "id": camera.id,
@@ -146,22 +147,22 @@ def camera_to_json(camera: Camera) -> dict[str, Any]:
     }
 
 
-def camera_from_json(told: Mapping[str, Any]) -> Camera:
-    """What `camera_to_json` wrote."""
-    width, height = told["size"]
-    lens = LENSES[told["model"]](
-        np.array(told["matrix"], dtype=float),
-        np.array(told["distortion"], dtype=float),
+def camera_from_json(document: Mapping[str, Any]) -> Camera:
+    """Return the camera that `camera_to_json` wrote."""
+    width, height = document["size"]
+    lens = LENSES[document["model"]](
+        np.array(document["matrix"], dtype=float),
+        np.array(document["distortion"], dtype=float),
         (width, height),
-        dict(told["sigma"]),
-        told.get("sigma_from"),
+        dict(document["sigma"]),
+        document.get("sigma_from"),
     )
-    return Camera(told["id"], lens, Pose(np.array(told["rotation"]), np.array(told["position"])))
+    return Camera(document["id"], lens, Pose(np.array(document["rotation"]), np.array(document["position"])))
 
 
 def _packed(values: NDArray[Any], kind: str) -> str:
     return base64.b64encode(values.astype(kind).tobytes()).decode()
 
 
-def _unpacked(told: str, kind: str) -> NDArray[Any]:
-    return np.frombuffer(base64.b64decode(told), dtype=kind)
+def _unpacked(text: str, kind: str) -> NDArray[Any]:
+    return np.frombuffer(base64.b64decode(text), dtype=kind)

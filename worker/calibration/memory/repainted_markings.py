@@ -1,4 +1,4 @@
-"""Markings that have been painted anew, elsewhere: told from a camera that moved and from a zoom.
+"""Repainted markings: told from a camera that moved and from a zoom.
 
 Between two nights the wind moves a camera a little; somebody may have touched it, its focal length may have changed,
 and single markings may lie elsewhere. What lens, ground and paint have wrong is the same in both nights and cancels, so
@@ -18,26 +18,16 @@ from worker.calibration.detection.line_measurement import NOISE_PX, Measurements
 from worker.calibration.geometry.arrays import Array
 from worker.calibration.geometry.derivatives import POSE_NUMBERS
 from worker.calibration.geometry.field import LinePoints
-from worker.calibration.geometry.lens import LENS_NUMBERS
+from worker.calibration.geometry.lens import LENS_PARAMETERS
 from worker.calibration.memory.camera_memory import WIND, CameraMemory
 from worker.calibration.memory.epoch import SAME_VIEW_PX, Epoch
 from worker.calibration.robust import HUBER, robust_scale
 
-LEAST_M, LEAST_PX = 0.025, 0.5
-"""A marking that has moved by more than both, pixels of a 4K frame, has been painted anew ..."""
-FEWEST_POINTS, MOST_MARKINGS = 8, 0.34
-"""... if so many of its points were measured in both nights, and no larger part of all markings has: else it is not
-the paint."""
-LEAST_GAIN = 30.0
-"""Half the sum of squares, in units of the expected errors, that a change has to explain to be one."""
-ROUNDS = 4
-HELD, TINY = 1e-9, 1e-12
-
 
 def find_repainted_markings(memory: CameraMemory, measured: Measurements, lines: LinePoints) -> NDArray[np.intp]:
-    """The markings whose paint lies elsewhere than in the first nights, where the lines are `measured` tonight.
+    """Return the markings whose paint lies elsewhere than in the first nights, where the lines are `measured` tonight.
 
-    Those that the memory says so of stay among them: nobody knows better where they are supposed to lie.
+    Markings that the memory already says are repainted stay among them: their true place is unknown.
     """
     known = np.array(memory.repainted_markings, dtype=np.intp)
     camera = memory.last.camera
@@ -45,54 +35,56 @@ def find_repainted_markings(memory: CameraMemory, measured: Measurements, lines:
     if differ.usual_px > SAME_VIEW_PX * camera.intrinsics.relative_size:
         return known
     markings, counts = np.unique(differ.marking, return_counts=True)
-    candidates = markings[counts >= FEWEST_POINTS]
-    limit_px = LEAST_PX * camera.intrinsics.relative_size
-    anew = [
+    candidates = markings[counts >= 8]
+    # A repainted marking has moved by more than 2.5 cm and half a pixel of a 4K frame.
+    limit_px = 0.5 * camera.intrinsics.relative_size
+    repainted = [
         number
         for number, metres in differ.explained_by(candidates).items()
-        if abs(metres) > LEAST_M and abs(metres) * np.median(differ.across[differ.marking == number]) > limit_px
+        if abs(metres) > 0.025 and abs(metres) * np.median(differ.across[differ.marking == number]) > limit_px
     ]
-    together = np.union1d(known, anew).astype(np.intp)
-    believable = len(together) <= MOST_MARKINGS * len(np.union1d(known, candidates))
+    together = np.union1d(known, repainted).astype(np.intp)
+    # If more markings have moved it is not the paint.
+    believable = len(together) <= 0.34 * len(np.union1d(known, candidates))
     return together if believable else known
 
 
 @dataclass(frozen=True)
 class _Differences:
-    """How far (M,) px the lines of tonight are beside those of an epoch, measured from where its camera puts them.
+    """Differences (M,) px between tonight's lines and those of an epoch, seen from the epoch's camera.
 
-    `marking` (M,); `slopes` (M, 6) of the offset, px per rad and metre of the pose; `longer` (M,) px when the focal
+    `marking` (M,); `jacobian` (M, 6) of the offset, px per rad and metre of the pose; `longer` (M,) px when the focal
     length doubles; `across` (M,) px per metre.
     """
 
     offset: Array
     marking: NDArray[np.intp]
-    slopes: Array
+    jacobian: Array
     longer: Array
     across: Array
 
     @classmethod
     def between(cls, last: Epoch, measured: Measurements, lines: LinePoints) -> _Differences:
-        """The differences at the line points that were measured well in the epoch and tonight."""
+        """Return the differences at the line points that were measured well in the epoch and tonight."""
         index, tonight, before = np.intersect1d(measured.index, last.index, return_indices=True)
         measured, camera, positions = measured[tonight], last.camera, lines.position[index]
         offset = measured.offset(camera, positions) - last.offset[before]
-        slopes = measured.slopes(camera, positions)
-        focal = measured.lens_slopes(camera, positions)[:, LENS_NUMBERS.index("focal_length_px")]
-        known = np.isfinite(offset) & np.isfinite(slopes).all(axis=1) & np.isfinite(focal)
+        jacobian = measured.jacobian(camera, positions)
+        focal = measured.lens_jacobian(camera, positions)[:, LENS_PARAMETERS.index("focal_length_px")]
+        known = np.isfinite(offset) & np.isfinite(jacobian).all(axis=1) & np.isfinite(focal)
         longer = focal * camera.intrinsics.focal_length_px
         return cls(
-            offset[known], lines.marking[index][known], slopes[known], longer[known], measured.px_per_metre[known]
+            offset[known], lines.marking[index][known], jacobian[known], longer[known], measured.px_per_metre[known]
         )
 
     @property
     def usual_px(self) -> float:
-        """How far a line is from where it was, mostly."""
+        """Median distance of a line from its earlier place."""
         return float(np.median(np.abs(self.offset))) if len(self.offset) else np.inf
 
     def explained_by(self, candidates: NDArray[np.intp]) -> dict[int, float]:
-        """Which markings have moved, and by how many metres, where camera and focal length may have changed as well."""
-        open_to: dict[int | str, Array] = {"zoomed": self.longer[:, None], "touched": self.slopes}
+        """Return the markings that have moved, in metres; camera and focal length may have changed too."""
+        open_to: dict[int | str, Array] = {"zoomed": self.longer[:, None], "touched": self.jacobian}
         for marking in candidates.tolist():
             open_to[marking] = (self.across * (self.marking == marking))[:, None]
         sigma_px = self._sigma_px(list(open_to.values()))
@@ -101,7 +93,8 @@ class _Differences:
         while open_to:
             tried = {name: self._fitted([*taken.values(), its], sigma_px) for name, its in open_to.items()}
             best = min(tried, key=lambda name: tried[name][0])
-            if loss - tried[best][0] < LEAST_GAIN:
+            # Half the sum of squares, in units of the expected errors, that a change has to explain to be accepted.
+            if loss - tried[best][0] < 30.0:
                 break
             loss, change = tried[best]
             taken[best] = open_to.pop(best)
@@ -110,24 +103,24 @@ class _Differences:
         return {name: -float(by[0]) for name, by in zip(taken, parts, strict=False) if isinstance(name, int)}
 
     def _sigma_px(self, columns: Sequence[Array]) -> float:
-        """Error of a difference: of two measurements, or more where even all changes together leave more."""
+        """Return the standard deviation of a difference: of two measurements, or more if changes leave more."""
         usual = float(np.hypot(NOISE_PX, NOISE_PX))
         _, change = self._fitted(columns, usual)
-        return usual * robust_scale((self.offset + np.concatenate([self.slopes, *columns], axis=1) @ change) / usual)
+        return usual * robust_scale((self.offset + np.concatenate([self.jacobian, *columns], axis=1) @ change) / usual)
 
     def _fitted(self, columns: Sequence[Array], sigma_px: float) -> tuple[float, Array]:
-        """Huber's loss where the change (6 + n,) of the pose, by wind, and of `columns` (M, n) in all makes it least,
-        and that change."""
-        jacobian = np.concatenate([self.slopes, *columns], axis=1) / sigma_px
+        """Return Huber's loss and the change (6 + n,) of pose and `columns` (M, n) that minimises it."""
+        jacobian = np.concatenate([self.jacobian, *columns], axis=1) / sigma_px
         known = np.eye(POSE_NUMBERS, jacobian.shape[1]) / WIND[:, None]
-        scale = np.maximum(np.linalg.norm(jacobian, axis=0), TINY)
+        tiny = 1e-12
+        scale = np.maximum(np.linalg.norm(jacobian, axis=0), tiny)
         offset, weight = self.offset / sigma_px, np.ones(len(self.offset))
         change = np.zeros(jacobian.shape[1])
-        for _ in range(ROUNDS):
+        for _ in range(4):
             root = np.sqrt(weight)
             rows = np.concatenate([jacobian * root[:, None], known]) / scale
-            change = np.linalg.lstsq(rows, np.append(-offset * root, np.zeros(POSE_NUMBERS)), rcond=HELD)[0] / scale
-            left = np.abs(offset + jacobian @ change)
-            weight = np.minimum(1.0, HUBER / np.maximum(left, TINY))
-        loss = np.sum(weight * (2 - weight) * left**2) + np.sum((known @ change) ** 2)
+            change = np.linalg.lstsq(rows, np.append(-offset * root, np.zeros(POSE_NUMBERS)), rcond=1e-9)[0] / scale
+            residual = np.abs(offset + jacobian @ change)
+            weight = np.minimum(1.0, HUBER / np.maximum(residual, tiny))
+        loss = np.sum(weight * (2 - weight) * residual**2) + np.sum((known @ change) ** 2)
         return float(loss) / 2, change

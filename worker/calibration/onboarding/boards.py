@@ -1,4 +1,4 @@
-"""Calibration boards in photos: where the corners of a chessboard or a ChArUco board are, to a part of a pixel."""
+"""Calibration boards in photos: corners of a chessboard or a ChArUco board, to a part of a pixel."""
 
 from __future__ import annotations
 
@@ -13,16 +13,10 @@ from worker.calibration.geometry.camera import Array
 
 Grey = NDArray[np.uint8]
 
-FEWEST_CORNERS = 8
-"""Of a ChArUco board, parts of which may be hidden: fewer do not show how it lies."""
-LARGEST_SEARCH_PX = 1600
-"""Longer side of the picture in which the old detector looks for a board; it finds big squares only."""
-REFINE_WINDOW_PX = 11
-
 
 @dataclass(frozen=True)
 class Charuco:
-    """What a ChArUco board has beside its chessboard: OpenCV's name of the dictionary, and the side of a marker (m)."""
+    """Additions of a ChArUco board to its chessboard: OpenCV's name of the dictionary, and the side of a marker (m)."""
 
     dictionary: str
     marker_m: float
@@ -30,7 +24,7 @@ class Charuco:
 
 @dataclass(frozen=True)
 class Board:
-    """A board of `columns` x `rows` inner corners, where four squares meet, `square_m` apart."""
+    """Board of `columns` x `rows` inner corners, where four squares meet, `square_m` apart."""
 
     columns: int
     rows: int
@@ -39,7 +33,7 @@ class Board:
 
     @cached_property
     def corners(self) -> Array:
-        """All inner corners (columns * rows, 3), row by row, on z = 0."""
+        """Inner corners (columns * rows, 3), row by row, on z = 0."""
         x, y = np.meshgrid(np.arange(self.columns), np.arange(self.rows))
         return self.square_m * np.stack([x.ravel(), y.ravel(), 0 * x.ravel()], axis=1).astype(float)
 
@@ -54,9 +48,9 @@ class Board:
 
 @dataclass(frozen=True)
 class BoardDetection:
-    """A board in a photo: `world` (N, 3) m of corners on the board, `pixel` (N, 2).
+    """Board in a photo: `world` (N, 3) m of corners on the board, `pixel` (N, 2).
 
-    `edge_px`: how wide its edges are, from 10 to 90 % of their height; None where it was not measured.
+    `edge_px`: width of its edges, from 10 to 90 % of their height; None where it was not measured.
     """
 
     world: Array
@@ -65,12 +59,12 @@ class BoardDetection:
 
 
 def find_board(photo: Grey, board: Board) -> BoardDetection | None:
-    """The board in a photo (H, W), None where it cannot be found."""
+    """Find the board in a photo (H, W); None where it cannot be found."""
     return _charuco(photo, board) if board.charuco else _chessboard(photo, board)
 
 
 def other_size(photo: Grey, board: Board) -> tuple[int, int] | None:
-    """The inner corners (columns, rows) of the board in a photo if they were miscounted by one: as squares, usually."""
+    """Return the board's inner corners (columns, rows) in a photo if miscounted by one: as squares, usually."""
     if board.charuco is not None:
         return None
     for columns, rows in ((-1, -1), (1, 1), (0, -1), (-1, 0), (0, 1), (1, 0)):
@@ -91,15 +85,16 @@ def _chessboard(photo: Grey, board: Board) -> BoardDetection | None:
 
 
 def _by_its_quadrangles(photo: Grey, size: tuple[int, int]) -> NDArray[np.float32] | None:
-    """OpenCV's older detector: it finds some boards, with glare or a narrow rim, that the newer one does not."""
-    scale = min(1.0, LARGEST_SEARCH_PX / max(photo.shape))
+    """Find a board by OpenCV's older detector, which finds some with glare or a narrow rim."""
+    # Longer side of the picture in which the old detector looks for a board; it finds big squares only.
+    scale = min(1.0, 1600 / max(photo.shape))
     small = cv2.resize(photo, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
     flags = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_FAST_CHECK
     found, corners = cv2.findChessboardCorners(small, size, flags=flags)
     if not found:
         return None
     full = ((corners + 0.5) / scale - 0.5).astype(np.float32)
-    window = (REFINE_WINDOW_PX, REFINE_WINDOW_PX)
+    window = (11, 11)
     criteria = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_COUNT, 40, 1e-3)
     return np.asarray(cv2.cornerSubPix(photo, full, window, (-1, -1), criteria), dtype=np.float32)
 
@@ -113,7 +108,8 @@ def _detection(photo: Grey, size: tuple[int, int], board: Board, corners: NDArra
 
 def _charuco(photo: Grey, board: Board) -> BoardDetection | None:
     corners, ids, _, _ = board.charuco_detector.detectBoard(photo)
-    if ids is None or len(ids) < FEWEST_CORNERS:
+    # Fewest corners of a ChArUco board, parts of which may be hidden: fewer do not show how it lies.
+    if ids is None or len(ids) < 8:
         return None
     world = board.corners[np.ravel(ids)]
     if min(np.ptp(world, axis=0)[:2]) == 0:

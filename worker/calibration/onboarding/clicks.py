@@ -1,4 +1,4 @@
-"""Points of the pitch that somebody clicked in a picture, and whether they can fix a pose at all."""
+"""Clicks on points of the field in a picture, and whether they can fix a pose at all."""
 
 from __future__ import annotations
 
@@ -12,13 +12,11 @@ from worker.calibration.geometry.camera import Array, inside
 from worker.calibration.geometry.lens import Lens
 
 FEWEST_CLICKS = 4
-COLLINEAR = 0.01
-"""Width to length of a set of points below which they are a line."""
 
 
 @dataclass(frozen=True)
 class Clicks:
-    """Points that somebody clicked: `names` (N), `world` (N, 3) metres, `pixel` (N, 2)."""
+    """Clicked points: `names` (N), `world` (N, 3) metres, `pixel` (N, 2)."""
 
     names: tuple[str, ...]
     world: Array
@@ -32,21 +30,21 @@ class Clicks:
         return Clicks(tuple(self.names[i] for i in index), self.world[index], self.pixel[index])
 
     def swapped(self, first: int, second: int) -> Clicks:
-        """The labels of two clicks exchanged."""
+        """Return the clicks with the labels of two exchanged."""
         order = np.arange(len(self))
         order[[first, second]] = second, first
         return Clicks(tuple(self.names[i] for i in order), self.world[order], self.pixel)
 
     @property
     def distinct(self) -> int:
-        """How many different points of the world they are of."""
+        """Number of different points of the world."""
         return len(np.unique(np.round(self.world, 3), axis=0))
 
     def on_one_line(self, but: str = "") -> str | None:
-        """Why they fix no pose, and what to do, if they lie on one line, or all but one do; None if not.
+        """Return why the clicks fix no pose, and what to do, if they lie on one line, or all but one do; None if not.
 
-        Of a camera that could turn around a line, whatever one more click says is believed, right or wrong. `but`:
-        which clicks are not among these, in words.
+        With a camera that could turn around a line, whatever one more click says is believed, right or wrong. `but`:
+        clicks that are not among these, in words.
         """
         every = _line(self)
         if every is not None:
@@ -61,7 +59,7 @@ class Clicks:
 
 @dataclass(frozen=True)
 class _Line:
-    """What is said of points on one line: what lies there, how, and what to add."""
+    """Words about points on one line: what lies there, how, and what to add."""
 
     of: str
     lie: str
@@ -69,7 +67,7 @@ class _Line:
 
 
 class UndeterminedPoseError(Exception):
-    """The clicks cannot fix a pose, whatever they are worth: says what to add or to change."""
+    """Raised when the clicks cannot fix a pose, whatever they are worth: says what to add or to change."""
 
 
 def require_a_plane(clicks: Clicks, lens: Lens) -> None:
@@ -88,22 +86,24 @@ def require_a_plane(clicks: Clicks, lens: Lens) -> None:
 
 
 def require_more_than_a_line(clicks: Clicks) -> None:
-    """Refuse those of which all but one lie on a line, where no pose was found that explains them."""
+    """Refuse clicks of which all but one lie on a line, where no pose was found that explains them."""
     line = clicks.on_one_line()
     if line is not None:
         raise UndeterminedPoseError(line)
 
 
 def _line(clicks: Clicks) -> _Line | None:
-    if _flatness(clicks.world) < COLLINEAR:
+    # Ratio of width to length of a set of points below which they are a line.
+    collinear = 0.01
+    if _flatness(clicks.world) < collinear:
         return _Line("points", "lie on one line, around which the camera could turn", "add points off that line")
-    if _flatness(clicks.pixel) < COLLINEAR:
+    if _flatness(clicks.pixel) < collinear:
         return _Line("clicks", "lie on one line of the picture", "add points nearer to and farther from the camera")
     return None
 
 
 def _flatness(points: Array) -> float:
-    """Second to first extent of points (N, d): 0 for a line."""
+    """Return the ratio of the second to the first extent of points (N, d): 0 for a line."""
     extents = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
     return float(extents[1] / max(extents[0], 1e-12))
 

@@ -1,4 +1,4 @@
-"""Labels exchanged by mistake: which two of a set of clicks explain it better the other way round.
+"""Labels exchanged by mistake: pairs of clicks that a pose explains better the other way round.
 
 Before any fit, with the best pair of every proposed pose; after it, with every two doubted clicks that lie on each
 other's points.
@@ -17,7 +17,7 @@ from worker.calibration.onboarding.point_fit import PointFit, fit
 
 
 def best_exchanges(costs: Array) -> tuple[NDArray[np.intp], Array]:
-    """The two labels (P, 2) whose exchange spares each of P poses most, and how much (P,); negative: none spares any.
+    """Return the two labels (P, 2) whose exchange spares each of P poses most, and how much (P,), if positive.
 
     `costs` (P, N, N): what click i costs as the point of click j. To say which two are meant is paid for.
     """
@@ -30,7 +30,7 @@ def best_exchanges(costs: Array) -> tuple[NDArray[np.intp], Array]:
 
 
 def exchange_labels(found: PointFit) -> PointFit:
-    """The fit after exchanging every two labels that explain each other's clicks."""
+    """Return the fit after exchanging every two labels that explain each other's clicks."""
     for _ in range(len(found.clicks) // 2):
         pair = _exchangeable(found)
         if pair is None:
@@ -43,7 +43,7 @@ def exchange_labels(found: PointFit) -> PointFit:
 
 
 def _exchangeable(found: PointFit) -> tuple[int, int] | None:
-    """The two doubted clicks that are best exchanged, if that leaves neither doubted."""
+    """Return the two doubted clicks that are best exchanged, if that leaves neither doubted."""
     doubted = np.flatnonzero(found.doubted)
     pixels = found.camera.project(found.clicks.world)
     best, pair = np.inf, None
@@ -55,5 +55,5 @@ def _exchangeable(found: PointFit) -> tuple[int, int] | None:
 
 
 def with_other_labels(clicks: Clicks, found: PointFit) -> NDArray[np.bool_]:
-    """Which clicks (N,) a fit takes for another point than their own."""
+    """True for clicks (N,) that a fit takes for another point than their own."""
     return np.asarray((found.clicks.world != clicks.world).any(axis=1))

@@ -1,4 +1,4 @@
-"""A camera's first pose, from points of the pitch that somebody clicked in its picture.
+"""First pose of a camera, from points of the field that somebody clicked in its picture.
 
 It only has to be near enough for a calibration to catch it. What makes it hard is that clicks come with wrong labels
 and lenses with wrong numbers, and that either can pass for the other. So poses are proposed by triples of clicks, each
@@ -25,11 +25,11 @@ from worker.calibration.onboarding.p3p_proposals import is_same_pose, most_promi
 from worker.calibration.onboarding.point_fit import AMBIGUOUS, STRONG, PointFit, fit
 
 MOST_DOUBTED = 0.25
-"""Share of the clicks; where more are doubted, something is wrong with all of them."""
+"""Largest share of doubted clicks; where more are doubted, something is wrong with all of them."""
 
 
 def first_pose(clicks: Clicks, lens: Lens, landmarks: Mapping[str, Array], name: str = "camera") -> FirstPose:
-    """The pose that explains most clicks. `landmarks`: points (3,) of the pitch that a click may be meant for.
+    """Return the pose that explains most clicks. `landmarks`: points (3,) of the field that a click may be meant for.
 
     Deterministic. Raises `UndeterminedPoseError` where the points cannot fix a pose.
     """
@@ -52,7 +52,7 @@ def first_pose(clicks: Clicks, lens: Lens, landmarks: Mapping[str, Array], name:
 
 
 def _candidates(clicks: Clicks, lens: Lens, name: str) -> list[PointFit]:
-    """Fits above the ground, the best first, no two of the same pose."""
+    """Return fits above the ground, the best first, no two of the same pose."""
     rotations, positions = propose_poses(clicks, lens)
     above = positions[:, 2] > HEIGHTS_M[0]
     begun = most_promising_poses(clicks, lens, rotations[above], positions[above])
@@ -80,7 +80,7 @@ def _needs_explaining(best: PointFit) -> bool:
 
 
 def _require_not_mirrored(fits: Sequence[PointFit], clicks: Clicks, lens: Lens, name: str) -> None:
-    """Labels of a pitch seen in a mirror fit perfectly, from below the ground."""
+    """Refuse labels of a mirrored field, which fit perfectly from below the ground."""
     flipped = _candidates(Clicks(clicks.names, clicks.world * [-1.0, 1.0, 1.0], clicks.pixel), lens, name)
     if not flipped or flipped[0].doubted.mean() > MOST_DOUBTED:
         return

@@ -1,4 +1,4 @@
-"""What a first pose rests on, and what is wrong with it: each click, how sure the pose is, and what to do."""
+"""Verdict on a first pose: on each click, how sure the pose is, and what to do."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from math import comb
 import numpy as np
 
 from worker.calibration.geometry.camera import Array, Camera, inside
-from worker.calibration.geometry.derivatives import POSE_NUMBERS, pixel_slopes
+from worker.calibration.geometry.derivatives import POSE_NUMBERS, pixel_jacobian
 from worker.calibration.geometry.plausible_pose import FARTHEST_M, HIGHEST_M
 from worker.calibration.onboarding.clicks import FEWEST_CLICKS, Clicks
 from worker.calibration.onboarding.exchanged_labels import with_other_labels
@@ -17,18 +17,15 @@ from worker.calibration.onboarding.freed_lens import FEWEST_SPARE, LensGain
 from worker.calibration.onboarding.point_fit import PointFit
 
 LARGEST_RMS_PX = 40.0
-LARGEST_SIGMA_PX = 60.0
-"""Of clicks and of the pitch in view, in pixels of a 4K frame: what a calibration still catches, with room to spare."""
 HEIGHTS_M = (0.5, HIGHEST_M)
-LARGEST_CHANCE = 1e-3
-"""Poses that may be expected to explain as much by chance; see `expected_by_chance`."""
 
 
 @dataclass(frozen=True)
 class Click:
-    """What became of one click: `residual_px`; `doubted`: it does not belong to its label.
+    """Verdict on one click: `residual_px`; `doubted`: it does not belong to its label.
 
-    `exchanged_with`: whose label explains it, and it theirs; `looks_like`: the landmark it is on.
+    `exchanged_with`: the click whose label explains it, and whose label it explains; `looks_like`: the landmark it is
+    on.
     """
 
     name: str
@@ -40,10 +37,10 @@ class Click:
 
 @dataclass(frozen=True)
 class FirstPose:
-    """A pose, what it rests on, and what is wrong with it (`rejected_because`; None: a calibration can begin with it).
+    """First pose, the evidence for it, and what is wrong with it (`rejected_because`; None: it is good enough).
 
-    `sigma_px`: rms standard deviation of where the camera sees the clicked part of the pitch. `lens`: None where the
-    camera's own was good enough.
+    `sigma_px`: rms standard deviation of the pixels of the clicked part of the field. `lens`: None where the camera's
+    own was good enough.
     """
 
     camera: Camera
@@ -64,7 +61,7 @@ def judge_first_pose(
     rivals: Sequence[PointFit],
     landmarks: Mapping[str, Array],
 ) -> FirstPose:
-    """What the `best` fit is worth. `gain`: what its lens was freed for; `rivals`: other poses that explain as much."""
+    """Judge the `best` fit. `gain`: from freeing its lens; `rivals`: other poses that explain as much."""
     pose_covariance = best.covariance[:POSE_NUMBERS, :POSE_NUMBERS]
     spread_px = float(np.sqrt(np.mean(sigma_px(best, best.clicks.world) ** 2)))
     verdicts = _verdicts(clicks, best, landmarks)
@@ -82,7 +79,7 @@ def judge_first_pose(
 
 
 def _verdicts(clicks: Clicks, best: PointFit, landmarks: Mapping[str, Array]) -> list[Click]:
-    """What became of each click as it was sent; `best.clicks` may have other labels."""
+    """Return the verdict on each click as it was sent; `best.clicks` may have other labels."""
     given = best.camera.project(clicks.world) - clicks.pixel
     residuals = np.where(np.isfinite(given).all(axis=1), np.linalg.norm(given, axis=1), np.inf)
     own = {name: number for number, name in enumerate(clicks.names)}
@@ -107,7 +104,7 @@ def _verdicts(clicks: Clicks, best: PointFit, landmarks: Mapping[str, Array]) ->
 
 
 def _nearest(best: PointFit, pixel: Array, landmarks: Mapping[str, Array]) -> str | None:
-    """The landmark that a click is on."""
+    """Return the landmark that a click is on."""
     if not landmarks:
         return None
     names = list(landmarks)
@@ -134,7 +131,7 @@ def _rejection(
             "label or the lens is wrong; with more points it can be said which"
         )
     chosen = any(verdict.doubted for verdict in verdicts)
-    if believed.distinct < FEWEST_CLICKS or (chosen and expected_by_chance(clicks, best) > LARGEST_CHANCE):
+    if believed.distinct < FEWEST_CLICKS or (chosen and expected_by_chance(clicks, best) > 1e-3):
         return (
             f"no pose explains more than {len(believed)} of {len(clicks)} points, and as many fit some pose by chance: "
             "check their labels and add more"
@@ -148,7 +145,7 @@ def _rejection(
             f"a camera at ({x:.1f}, {y:.1f}, {z:.1f}) m explains the points as well as one at "
             f"({position[0]:.1f}, {position[1]:.1f}, {position[2]:.1f}) m: {_what_to_add(best, landmarks)}"
         )
-    if spread_px > LARGEST_SIGMA_PX * relative:
+    if spread_px > 60.0 * relative:
         fixed = (
             f"fix the view to {spread_px:.0f} px only"
             if spread_px < max(best.camera.intrinsics.size)
@@ -162,7 +159,7 @@ def _rejection(
 
 
 def expected_by_chance(clicks: Clicks, best: PointFit) -> float:
-    """How many poses would explain as many clicks as closely, after as many exchanges, if no label were right.
+    """Return the expected number of poses that explain as many clicks as closely if no label were right.
 
     Moisan and Stival, "A probabilistic criterion to detect rigid point matches", IJCV 57, 2004: a pose is proposed by
     any three clicks, up to four times, and of the others any number may fit it.
@@ -178,7 +175,7 @@ def expected_by_chance(clicks: Clicks, best: PointFit) -> float:
 
 
 def _what_to_add(best: PointFit, landmarks: Mapping[str, Array]) -> str:
-    """The landmark in view whose place is least certain is the one that tells most."""
+    """Return advice to add the landmark in view whose place is least certain, which tells most."""
     clicked = best.clicks.world
     unused = {n: p for n, p in landmarks.items() if np.min(np.linalg.norm(clicked - p, axis=1)) > 1.0}
     if unused:
@@ -191,9 +188,9 @@ def _what_to_add(best: PointFit, landmarks: Mapping[str, Array]) -> str:
 
 
 def sigma_px(found: PointFit, points: Array) -> Array:
-    """One standard deviation (N,) px of where points (N, 3) are in the picture, by the pose alone."""
-    slopes = pixel_slopes(found.camera, points)
-    spread = np.einsum("nai,ij,naj->n", slopes, found.covariance[:POSE_NUMBERS, :POSE_NUMBERS], slopes)
+    """Return one standard deviation (N,) px of points (N, 3) in the picture, by the pose alone."""
+    jacobian = pixel_jacobian(found.camera, points)
+    spread = np.einsum("nai,ij,naj->n", jacobian, found.covariance[:POSE_NUMBERS, :POSE_NUMBERS], jacobian)
     return np.sqrt(np.nan_to_num(np.maximum(spread, 0.0), nan=0.0))
 
 
@@ -216,7 +213,7 @@ def _warnings(best: PointFit, gain: LensGain | None, landmarks: Mapping[str, Arr
 
 
 def _stands_behind_an_end(position: Array, landmarks: Mapping[str, Array]) -> bool:
-    """Whether a camera films along the field, from behind a goal line: it is of neither side, and no label is wrong."""
+    """True if a camera films along the field from behind a goal line: it is of neither side, and no label is wrong."""
     if not landmarks:
         return False
     half_length, half_width, _ = np.abs(np.stack(list(landmarks.values()))).max(axis=0)
@@ -224,7 +221,7 @@ def _stands_behind_an_end(position: Array, landmarks: Mapping[str, Array]) -> bo
 
 
 def _lens_words(gain: LensGain) -> str:
-    """What was wrong with the lens, in words."""
+    """Return what was wrong with the lens, in words."""
     was, now = gain.before.camera.intrinsics.matrix, gain.after.camera.intrinsics.matrix
     parts = [f"focal length {was[0, 0]:.0f} -> {now[0, 0]:.0f} px"]
     if "centre x" in gain.after.free:

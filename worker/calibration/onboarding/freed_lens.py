@@ -1,4 +1,4 @@
-"""As many free numbers of a lens as clicks can justify, and what freeing them is worth.
+"""Freed lens: as many free parameters of a lens as clicks can justify, and what freeing them is worth.
 
 A lens measured badly and a wrong label can pass for each other. So a lens is touched only where the fit's cost falls by
 what is very strong evidence, and clicks left out of it are foretold better.
@@ -22,16 +22,13 @@ LENS_LADDER: tuple[tuple[str, ...], ...] = (
     ("focal length", "centre x", "centre y", "k1", "k2"),
 )
 FEWEST_SPARE = 6
-"""Coordinates beyond the numbers of a fit without which its lens is not touched."""
-FOLDS = 10
-SQUARE_WITHIN = 0.02
-"""Pixels this near to square are square: a board that says otherwise by less was misread."""
+"""Fewest coordinates beyond the parameters of a fit with which its lens is freed."""
 OF_THE_MATRIX = ("fx", "fy", "aspect", "cx", "cy")
 
 
 @dataclass(frozen=True)
 class LensGain:
-    """What freeing numbers of the lens is worth: the fits `before` and `after`, and how well each foretells clicks.
+    """Gain from freeing parameters of the lens: the fits `before` and `after`, and how well each predicts clicks.
 
     `left_out_px`: rms of clicks where a fit to the others puts them.
     """
@@ -43,12 +40,12 @@ class LensGain:
 
     @property
     def evidence(self) -> float:
-        """By how much the cost falls (a difference of BIC: above 10 is very strong evidence)."""
+        """Decrease of the cost (a difference of BIC: above 10 is very strong evidence)."""
         return self.before.cost - self.after.cost
 
     @property
     def sigma(self) -> Mapping[str, float]:
-        """One standard deviation per free number; of the focal length and of the centre in pixels."""
+        """Standard deviation of each free parameter; of the focal length and of the centre in pixels."""
         deviations = np.sqrt(np.maximum(np.diag(self.after.covariance)[POSE_NUMBERS:], 0.0))
         # Its logarithm is what was fitted.
         focal = self.after.camera.intrinsics.focal_length_px
@@ -57,17 +54,17 @@ class LensGain:
 
     @property
     def found(self) -> PointFit:
-        """The fit `after`, whose lens has the `sigma` of what was freed and of what it keeps of the lens before."""
-        lens, told = self.after.camera.intrinsics, dict(self.sigma)
+        """Fit `after`, whose lens has the `sigma` of what was freed and of what it keeps of the lens before."""
+        lens, freed = self.after.camera.intrinsics, dict(self.sigma)
         names = {"centre x": "cx", "centre y": "cy"}
-        one = told.pop("focal length")
+        one = freed.pop("focal length")
         both = {"fx": one, "fy": one * float(lens.matrix[1, 1] / lens.matrix[0, 0])}
-        known = {**lens.sigma, **both, **{names.get(name, name): value for name, value in told.items()}}
+        known = {**lens.sigma, **both, **{names.get(name, name): value for name, value in freed.items()}}
         return replace(self.after, camera=self.after.camera.with_lens(replace(lens, sigma=known)))
 
 
 def free_lens(found: PointFit) -> LensGain | None:
-    """What the fit gains from as many free numbers of its lens as its clicks justify; None: they justify none."""
+    """Return the gain from as many free parameters of the lens as the clicks justify; None: they justify none."""
     lens = found.camera.intrinsics
     believed = int((~found.doubted).sum())
     rungs = [free for free in LENS_LADDER if 2 * believed >= POSE_NUMBERS + len(free) + FEWEST_SPARE]
@@ -83,11 +80,12 @@ def free_lens(found: PointFit) -> LensGain | None:
 
 
 def left_out_px(found: PointFit) -> float:
-    """Rms of believed clicks, each where a fit to the others puts it."""
+    """Return the rms of believed clicks, each against a fit to the others."""
     believed = found.clicks[~found.doubted]
     squared = []
-    for number in range(min(FOLDS, len(believed))):
-        out = np.arange(len(believed)) % min(FOLDS, len(believed)) == number
+    folds = 10
+    for number in range(min(folds, len(believed))):
+        out = np.arange(len(believed)) % min(folds, len(believed)) == number
         without = refit(found, believed[~out])
         off = without.camera.project(believed.world[out]) - believed.pixel[out]
         squared.append(np.sum(off**2, axis=1))
@@ -95,13 +93,14 @@ def left_out_px(found: PointFit) -> float:
 
 
 def two_terms(lens: Lens) -> Lens:
-    """The lens of the same kind with k1 and k2 alone, and square pixels, that comes nearest to `lens`.
+    """Return the lens of the same kind with k1 and k2 alone, and square pixels, that comes nearest to `lens`.
 
     How well the matrix is known stays; k1 and k2 are others, of which nothing is known yet.
     """
     matrix = lens.matrix.copy()
     matrix[0, 1] = 0.0
-    if abs(matrix[1, 1] / matrix[0, 0] - 1) < SQUARE_WITHIN:
+    # Deviation from square up to which pixels are square: a board that says otherwise by less was misread.
+    if abs(matrix[1, 1] / matrix[0, 0] - 1) < 0.02:
         matrix[0, 0] = matrix[1, 1] = np.sqrt(matrix[0, 0] * matrix[1, 1])
     farthest = np.nanmax(np.linalg.norm(lens.undistort(lens.border(20)), axis=1))
     radius = np.linspace(0.0, farthest, 50)[1:-1]
@@ -118,7 +117,7 @@ def two_terms(lens: Lens) -> Lens:
 
 
 def _radial_only(lens: Lens) -> Array:
-    """The distortion of a lens without what is not the same all around its axis."""
+    """Return the distortion of a lens without its terms that are not the same all around its axis."""
     distortion = np.array(lens.distortion, dtype=float)
     if lens.model == "opencv":
         distortion[2:4] = 0.0

@@ -1,4 +1,4 @@
-"""A lens from photos of a board: Zhang's method by OpenCV, with no more terms than the photos can justify.
+"""Lens from photos of a board: Zhang's method by OpenCV, with no more terms than the photos can justify.
 
 A small residual proves little: with enough terms every set of photos fits. So each lens is judged by photos it was not
 fitted to, the simplest that foretells them as well as the best is taken, and how much the numbers change when photos
@@ -21,29 +21,20 @@ from worker.calibration.geometry.lens import Lens, LensModel
 from worker.calibration.onboarding.boards import BoardDetection
 from worker.calibration.onboarding.lens_fit import (
     LADDERS,
-    NUMBERS,
+    PARAMETERS,
     LensFit,
     Rung,
     fit_lens,
-    numbers_of,
+    parameter_values,
     predicted_rms_px,
     residuals_px,
     rms,
 )
 
-FEWEST_PHOTOS, FEW_PHOTOS = 4, 10
-FOLDS = 5
+FEWEST_PHOTOS = 4
 ROUNDS = 4
-HURTS, HURTS_PX = 3.0, 1.0
-"""A photo hurts where the others foretell it this many times worse than the median, and at least so badly."""
-MOST_LEFT_OUT = 0.3
-BLURRED, BLURRED_PX = 2.0, 6.0
-"""Edges wider than this many times the median, and at least so wide."""
 CELLS = (8, 5)
 """Columns and rows of the picture in which corners are counted."""
-FEW_CELLS = 0.6
-UNSURE = 0.01
-"""Of the focal length, or of the picture's width for the centre: more is not sure enough for a pitch."""
 ZONES = (("top left", "top", "top right"), ("left", "middle", "right"), ("bottom left", "bottom", "bottom right"))
 
 Fate = Literal["used", "no-board", "wrong-size", "hurts"]
@@ -51,7 +42,7 @@ Fate = Literal["used", "no-board", "wrong-size", "hurts"]
 
 @dataclass(frozen=True)
 class Photo:
-    """A photo by its name, its `size` (width, height) and what was seen in it."""
+    """Photo by its name, its `size` (width, height) and the board in it."""
 
     name: str
     size: tuple[int, int]
@@ -60,7 +51,7 @@ class Photo:
 
 @dataclass(frozen=True)
 class PhotoVerdict:
-    """What became of a photo. `rms_px`: how well its corners fit; `left_out_px`: how well the other photos foretell it.
+    """Verdict on a photo. `rms_px`: how well its corners fit; `left_out_px`: how well the other photos predict it.
 
     `blurred`: its edges are wide beside those of the others.
     """
@@ -81,13 +72,13 @@ class Coverage:
 
     @property
     def share(self) -> float:
-        """Of the cells that a corner of the board reached."""
+        """Share of the cells that a corner of the board reached."""
         return float(np.mean(self.cells > 0))
 
 
 @dataclass(frozen=True)
 class LensTrial:
-    """A lens that was tried: its free numbers, and rms residuals of photos fitted and of photos left out."""
+    """Lens model that was tried: its free parameters, and rms residuals of photos fitted and of photos left out."""
 
     terms: tuple[str, ...]
     rms_px: float
@@ -96,11 +87,11 @@ class LensTrial:
 
 @dataclass(frozen=True)
 class LensCalibration:
-    """The lens and what it is worth.
+    """Lens with its uncertainty and the evidence for it.
 
-    `sigma`: one standard deviation per free number, by OpenCV, corners independent; `spread`: the same by leaving out
-    photos (a jackknife over `FOLDS` groups); the `lens` has the larger of both. `corners` and `off` (N, 2): those used,
-    and projected minus seen, px.
+    `sigma`: one standard deviation per free parameter, by OpenCV, corners independent; `spread`: the same by leaving
+    out photos (a jackknife over five groups); the `lens` has the larger of both. `corners` and `off` (N, 2): those
+    used, and projected minus seen, px.
     """
 
     lens: Lens
@@ -118,7 +109,7 @@ class LensCalibration:
 
 
 class UndeterminedLensError(Exception):
-    """The photos cannot fix a lens: says why and what to do."""
+    """Raised when the photos cannot fix a lens: says why and what to do."""
 
 
 def calibrate_lens(
@@ -131,12 +122,12 @@ def calibrate_lens(
     size = _common_size(photos)
     used = {p.name: p.detection for p in photos if p.detection is not None and p.size == size}
     _require_enough(used, photos)
-    most = int(MOST_LEFT_OUT * len(used))
+    most = int(0.3 * len(used))
     hurting: dict[str, float] = {}
     for number in range(ROUNDS):
         chosen = _choose(list(used.values()), size, model, _part(report, number))
         bad = _hurting(list(used), chosen.best.left_out_by_photo, most - len(hurting))
-        # What the last round would leave out has been fitted, and its figures are those of that fit.
+        # Photos that the last round would leave out have been fitted, and their figures are those of that fit.
         if not bad or number == ROUNDS - 1:
             break
         hurting |= bad
@@ -145,7 +136,7 @@ def calibrate_lens(
 
 
 def _part(report: Callable[[float], None], number: int) -> Callable[[float], None]:
-    """Reports a share 0..1 of one round as one of all."""
+    """Return a reporter that takes the share 0..1 of one round as one of all."""
     return lambda share: report((number + share) / ROUNDS)
 
 
@@ -167,12 +158,12 @@ def _require_enough(used: Mapping[str, BoardDetection], photos: Sequence[Photo])
         )
 
 
-# Which lens
+# Choice of the lens
 
 
 @dataclass(frozen=True)
 class _Tried:
-    """A rung: its fit to all photos, and what the fits without some of them say of those, and of the numbers.
+    """Fit of a rung to all photos, with the errors and the spread of parameters of the fits without some of them.
 
     `aspect_spread`: of fy/fx, which vary together.
     """
@@ -189,7 +180,7 @@ class _Tried:
 
     @property
     def deviations(self) -> tuple[dict[str, float], dict[str, float]]:
-        """One standard deviation per free number: by the fit, and by leaving out photos."""
+        """Standard deviations of the free parameters: by the fit, and by leaving out photos."""
         lens = self.fit.lens
         return _by_name(self.fit.sigma, self.rung, lens), _by_name(self.spread, self.rung, lens)
 
@@ -203,7 +194,7 @@ class _Chosen:
 def _choose(
     detections: Sequence[BoardDetection], size: tuple[int, int], model: LensModel, report: Callable[[float], None]
 ) -> _Chosen:
-    """The simplest rung that foretells photos as well as the best one, within a standard error of the difference."""
+    """Choose the simplest rung that predicts photos as well as the best one, but for a standard error."""
     tried = []
     for step, rung in enumerate(LADDERS[model]):
         report(step / len(LADDERS[model]))
@@ -221,37 +212,38 @@ def _choose(
 
 
 def _as_good(left_out: Array, best: Array) -> bool:
-    """Whether residuals (photos,) are no larger than the best ones but for a standard error of the difference."""
+    """True if residuals (photos,) are no larger than the best ones but for a standard error of the difference."""
     worse = left_out**2 - best**2
     return bool(worse.mean() <= worse.std(ddof=1) / np.sqrt(len(worse)))
 
 
 def _try(detections: Sequence[BoardDetection], size: tuple[int, int], model: LensModel, rung: Rung) -> _Tried:
-    count = min(FOLDS, len(detections))
+    count = min(5, len(detections))
     left_out = np.empty(len(detections))
     numbers = []
     for fold in range(count):
         out = [i for i in range(len(detections)) if i % count == fold]
         without = fit_lens([s for i, s in enumerate(detections) if i not in out], size, model, rung)
         left_out[out] = [predicted_rms_px(without.lens, detections[i]) for i in out]
-        numbers.append(numbers_of(without.lens))
+        numbers.append(parameter_values(without.lens))
     parts = np.stack(numbers)
-    fx, fy = (parts[:, NUMBERS[model].index(name)] for name in ("fx", "fy"))
+    fx, fy = (parts[:, PARAMETERS[model].index(name)] for name in ("fx", "fy"))
     spread, (aspect_spread,) = _jackknife(parts), _jackknife((fy / fx)[:, None])
     return _Tried(rung, fit_lens(detections, size, model, rung), left_out, spread, float(aspect_spread))
 
 
 def _jackknife(parts: Array) -> Array:
-    """Standard deviations (K,) of numbers from what they are without each of some groups (groups, K)."""
+    """Return standard deviations (K,) of parameters from their values without each of some groups (groups, K)."""
     return np.sqrt((len(parts) - 1) * np.mean((parts - parts.mean(axis=0)) ** 2, axis=0))
 
 
-# Which photos
+# Choice of the photos
 
 
 def _hurting(names: Sequence[str], left_out_px: Array, most: int) -> dict[str, float]:
-    """The photos, up to `most`, that the others foretell far worse than each other."""
-    limit = max(HURTS * float(np.median(left_out_px)), HURTS_PX)
+    """Return the photos, up to `most`, that the others predict far worse than each other."""
+    # A photo hurts where the others predict it so many times worse than the median, and at least so badly.
+    limit = max(3.0 * float(np.median(left_out_px)), 1.0)
     worst = np.argsort(-left_out_px)[: max(most, 0)]
     return {names[i]: float(left_out_px[i]) for i in worst if left_out_px[i] > limit}
 
@@ -298,7 +290,8 @@ def _verdicts(
     fitted = dict(zip(used, best.fit.by_photo.tolist(), strict=True))
     foretold = dict(hurting) | dict(zip(used, best.left_out_by_photo.tolist(), strict=True))
     edges = [p.detection.edge_px for p in photos if p.detection and p.detection.edge_px]
-    wide = max(BLURRED * float(np.median(edges)), BLURRED_PX) if edges else np.inf
+    # Blurred edges are twice as wide as the median, and at least 6 px.
+    wide = max(2.0 * float(np.median(edges)), 6.0) if edges else np.inf
 
     def fate(photo: Photo) -> Fate:
         if photo.detection is None:
@@ -320,14 +313,14 @@ def _verdicts(
 
 
 def _by_name(values: Array, rung: Rung, lens: Lens) -> dict[str, float]:
-    known = dict(zip(NUMBERS[lens.model], values.tolist(), strict=True))
+    known = dict(zip(PARAMETERS[lens.model], values.tolist(), strict=True))
     # One focal length: OpenCV keeps the ratio and gives the deviation of fy alone.
     known["f"] = max(known["fx"], known["fy"])
     return {term: known[term] for term in rung.terms}
 
 
 def _known_to(chosen: _Chosen) -> dict[str, float]:
-    """One standard deviation per number as a lens names it: the worse of two opinions, both focal lengths apart.
+    """Return one standard deviation per parameter as a lens names it: the worse of two, both focal lengths apart.
 
     A principal point that was left in the middle is known as well as by the simplest lens that has it free.
     """
@@ -345,11 +338,11 @@ def _worse(sigma: Mapping[str, float], spread: Mapping[str, float]) -> dict[str,
     return {name: max(sigma[name], spread[name]) for name in sigma}
 
 
-# What it is worth
+# Coverage and warnings
 
 
 def measure_coverage(corners: Array, size: tuple[int, int]) -> Coverage:
-    """Where in a picture of `size` (width, height) corners (N, 2) were seen."""
+    """Count the corners (N, 2) over a picture of `size` (width, height)."""
     extent = ((0, size[1]), (0, size[0]))
     cells, _, _ = np.histogram2d(corners[:, 1], corners[:, 0], bins=(CELLS[1], CELLS[0]), range=extent)
     ninths, _, _ = np.histogram2d(corners[:, 1], corners[:, 0], bins=(3, 3), range=extent)
@@ -366,7 +359,7 @@ def _warnings(
     count: int,
 ) -> list[str]:
     found = []
-    if coverage.empty or coverage.share < FEW_CELLS:
+    if coverage.empty or coverage.share < 0.6:
         where = f" and nothing {', '.join(coverage.empty)}" if coverage.empty else ""
         found.append(
             f"the board reached {coverage.share:.0%} of the picture{where}: there the lens is a guess, and with it the "
@@ -375,9 +368,11 @@ def _warnings(
     worst = _worse(sigma, spread)
     focal = max(worst.get(name, 0.0) for name in ("f", "fx", "fy"))
     centre = max(worst.get(name, 0.0) for name in ("cx", "cy"))
-    if focal > UNSURE * lens.matrix[0, 0]:
+    # Largest sigma for a field, as a part of the focal length, or of the picture's width for the centre.
+    largest_sigma = 0.01
+    if focal > largest_sigma * lens.matrix[0, 0]:
         found.append(f"the focal length is sure to {focal:.0f} px only: tilt the board more, both ways")
-    if centre > UNSURE * lens.size[0]:
+    if centre > largest_sigma * lens.size[0]:
         found.append(f"the principal point is sure to {centre:.0f} px only: add photos all over the picture")
     if "cx" not in sigma:
         found.append("the photos do not fix the principal point: it was left in the middle of the picture")
@@ -388,6 +383,6 @@ def _warnings(
             f"the terms {', '.join(more)} are left at 0: with them the lens foretells photos left out no better "
             f"({richest.left_out_px:.2f} px rms, without them {best.left_out_px:.2f})"
         )
-    if count < FEW_PHOTOS:
+    if count < 10:
         found.append(f"{count} photos are few: 15 to 30 leave less to chance")
     return found

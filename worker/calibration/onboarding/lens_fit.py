@@ -1,4 +1,4 @@
-"""A lens fitted to boards in photos by OpenCV (Zhang's method), with the terms that are left free."""
+"""Lens fit to boards in photos by OpenCV (Zhang's method), with the terms that are left free."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from worker.calibration.onboarding.boards import BoardDetection
 
 @dataclass(frozen=True)
 class Rung:
-    """A lens to try: OpenCV's flags, and the names of the numbers they leave free."""
+    """Lens model to try: OpenCV's flags, and the names of the parameters they leave free."""
 
     terms: tuple[str, ...]
     flags: int
@@ -48,8 +48,9 @@ LADDERS: Mapping[LensModel, Sequence[Rung]] = {
         Rung(("fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4"), _FISHEYE),
     ),
 }
-"""From the simplest to the richest. Sensors have square pixels; a picture stretched by a converter has not."""
-NUMBERS: Mapping[LensModel, tuple[str, ...]] = {
+"""Lens models from the simplest to the richest. Sensors have square pixels; a picture stretched by a converter has
+not."""
+PARAMETERS: Mapping[LensModel, tuple[str, ...]] = {
     "opencv": ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"),
     "fisheye": ("fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4"),
 }
@@ -57,7 +58,7 @@ NUMBERS: Mapping[LensModel, tuple[str, ...]] = {
 
 @dataclass(frozen=True)
 class LensFit:
-    """OpenCV's answer: the board's place in each photo, `sigma` (K,) in the order of `NUMBERS`, rms `by_photo`."""
+    """Result of OpenCV: the board's place in each photo, `sigma` (K,) in the order of `PARAMETERS`, rms `by_photo`."""
 
     lens: Lens
     turns: Sequence[Array]
@@ -67,7 +68,7 @@ class LensFit:
 
 
 def fit_lens(detections: Sequence[BoardDetection], size: tuple[int, int], model: LensModel, rung: Rung) -> LensFit:
-    """The lens with the terms of a rung that fits best. Raises `cv2.error` where the photos cannot carry them."""
+    """Fit the lens with the terms of a rung. Raises `cv2.error` where the photos cannot carry them."""
     world = [s.world.astype(np.float32) for s in detections]
     pixel = [s.pixel.astype(np.float32) for s in detections]
     return (_fit_fisheye if model == "fisheye" else _fit_pinhole)(world, pixel, size, rung)
@@ -81,7 +82,7 @@ def _fit_pinhole(
         world, pixel, size, guess, np.zeros(8 if rung.flags & cv2.CALIB_RATIONAL_MODEL else 5), flags=rung.flags
     )
     lens = LENSES["opencv"](_floats(matrix), _floats(distortion).ravel(), size)
-    numbers = _floats(sigma).ravel()[: len(NUMBERS["opencv"])]
+    numbers = _floats(sigma).ravel()[: len(PARAMETERS["opencv"])]
     return LensFit(lens, _vectors(turns), _vectors(shifts), numbers, _floats(by_photo).ravel())
 
 
@@ -108,15 +109,15 @@ def _centred(focal: float, size: tuple[int, int]) -> Array:
 def _fisheye_sigma(
     lens: Lens, turns: Sequence[Array], shifts: Sequence[Array], world: Sequence[Array], rung: Rung, off: Array
 ) -> Array:
-    """What `calibrateCameraExtended` gives for a pinhole: the boards' places taken out of the normal matrix (Schur)."""
-    names = NUMBERS["fisheye"]
+    """Return a fisheye's deviations, with the boards' places eliminated from the normal matrix (Schur)."""
+    names = PARAMETERS["fisheye"]
     free = np.array([name in rung.terms for name in names])
     information = np.zeros((int(free.sum()), int(free.sum())))
     for turn, shift, corners in zip(turns, shifts, world, strict=True):
-        _, jacobian = cv2.fisheye.projectPoints(corners[None], turn, shift, lens.matrix, lens.distortion)
+        _, found = cv2.fisheye.projectPoints(corners[None], turn, shift, lens.matrix, lens.distortion)
         # Its columns: fx fy cx cy k1 to k4, the turn, the shift, the skew.
-        slopes = _floats(jacobian)
-        a, b = slopes[:, :8][:, free], slopes[:, 8:14]
+        jacobian = _floats(found)
+        a, b = jacobian[:, :8][:, free], jacobian[:, 8:14]
         information += a.T @ a - a.T @ b @ np.linalg.solve(b.T @ b, b.T @ a)
     spare = max(off.size - int(free.sum()) - 6 * len(world), 1)
     variance = np.diag(np.linalg.pinv(information, hermitian=True)) * np.sum(off**2) / spare
@@ -126,7 +127,7 @@ def _fisheye_sigma(
 
 
 def predicted_rms_px(lens: Lens, detection: BoardDetection) -> float:
-    """Rms of the corners of a photo by a lens that was not fitted to it; only the board's place is."""
+    """Return the rms of the corners of a photo by a lens that was not fitted to it; only the board's place is."""
     unforetold = float(max(lens.size))
     rays = lens.undistort(detection.pixel)
     known = np.isfinite(rays).all(axis=1)
@@ -140,13 +141,13 @@ def predicted_rms_px(lens: Lens, detection: BoardDetection) -> float:
 
 
 def residuals_px(lens: Lens, turn: Array, shift: Array, world: Array, pixel: Array) -> Array:
-    """Projected minus seen (N, 2) of a board at OpenCV's rvec and tvec."""
+    """Return projected minus seen (N, 2) of a board at OpenCV's rvec and tvec."""
     points = world @ rotation_matrices(turn).T + shift
     return lens.distort(points[:, :2] / points[:, 2:]) - pixel
 
 
 def _floats(values: Any) -> Array:
-    """As NumPy has numbers, whatever OpenCV calls them."""
+    """Return OpenCV's values as a NumPy array of floats."""
     return np.asarray(values, dtype=float)
 
 
@@ -154,12 +155,12 @@ def _vectors(columns: Any) -> list[Array]:
     return [_floats(column).ravel() for column in columns]
 
 
-def numbers_of(lens: Lens) -> Array:
-    """What a lens has, in the order of `NUMBERS`."""
-    terms = lens.coefficients[: len(NUMBERS[lens.model]) - 4]
+def parameter_values(lens: Lens) -> Array:
+    """Return the parameters of a lens, in the order of `PARAMETERS`."""
+    terms = lens.coefficients[: len(PARAMETERS[lens.model]) - 4]
     return np.array([lens.matrix[0, 0], lens.matrix[1, 1], lens.matrix[0, 2], lens.matrix[1, 2], *terms])
 
 
 def rms(values: Array) -> float:
-    """Root of the mean square."""
+    """Return the root of the mean square."""
     return float(np.sqrt(np.mean(np.square(values))))

@@ -1,1 +1,1 @@
-"""The paper's own method, kept for comparison: its objective on the ground, and no refinement."""
+"""Paper's own method, kept for comparison: its objective on the ground, and no refinement."""

@@ -1,4 +1,4 @@
-"""The paper's method on one page: the same frames and the same judgement, with its own search and without a finish."""
+"""Paper's method on one page: the same frames and the same judgement, with its own search and without a refinement."""
 
 from __future__ import annotations
 
@@ -8,14 +8,16 @@ from datetime import datetime
 
 import numpy as np
 
-from worker.calibration.calibrate import NO_MEMORIES, diagnose, judge_together, remember
+from worker.calibration.calibrate import NO_MEMORIES, diagnose, remember
 from worker.calibration.detection.view_condition import UsualView
 from worker.calibration.geometry.camera import Camera, Frame
 from worker.calibration.geometry.field import Field
+from worker.calibration.joint_verdict import judge_together
 from worker.calibration.memory.camera_memory import CameraMemory
 from worker.calibration.observe import NOTHING_USUAL, FrameObserver
 from worker.calibration.paper.ground_objective import NARROW, GroundObjective
 from worker.calibration.paper.search import ALONE_ON_THE_GROUND, ON_THE_GROUND, GroundLevel, search_on_ground
+from worker.calibration.problem import PoseSolution, Problem
 from worker.calibration.records import (
     NOT_RECORDED,
     Calibration,
@@ -30,12 +32,12 @@ from worker.calibration.refinement.refine import evaluate_poses
 from worker.calibration.refinement.uncertainty import RefinedPoses
 from worker.calibration.search.genome import genome_of
 from worker.calibration.search.search import Found, Strategy
-from worker.calibration.solve import PoseSolution, Problem, assess_stored, joined_deviations, judge_each, of_use_at
+from worker.calibration.steps import assess_stored, joined_deviations, judge_each, of_use_at
 
 
 @dataclass(frozen=True)
 class Preset:
-    """The levels of a search on the ground, and whether it takes the ground for a plane."""
+    """Levels of a search on the ground; `flat`: it takes the ground for a plane."""
 
     levels: Sequence[GroundLevel]
     flat: bool

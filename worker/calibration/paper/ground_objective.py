@@ -32,21 +32,10 @@ from worker.calibration.geometry.rotation import rotation_matrices
 
 PIXELS_PER_METRE = 10.0
 COARSEST = 32
-"""Pixels a side of what may be one on the coarsest grid."""
-MARKED = 0.5
-"""Where a segmentation says this or more there is a line."""
-REACH_PX = 8
-"""How far beside a blurred line of the template a union reaches, in pixels of the grid of that blur."""
-LINE_STEP_M, LINE_SAMPLES = 0.02, 6
-"""How finely the template is drawn, along a line and across it."""
-MARGIN_M = 2.0
-LEAST_PX_PER_METRE = 6.0
-"""Ground counts where a metre of it, away from the camera, is at least so high in a 4K frame."""
-LARGEST_UNDISTORTED = 2.5
-"""Undistorted frames are cut where they would be wider than this many times the frame."""
+"""Side, in pixels, of the square that may be one pixel on the coarsest grid."""
 
 Picture = NDArray[np.uint8]
-"""Grey, or a mask that is 0 where it is not."""
+"""Grey picture, or a mask that is 0 where it is not."""
 Grey = NDArray[np.float32]
 
 
@@ -59,9 +48,9 @@ class Blurs:
 
 
 BROAD = Blurs(1.5, 5)
-"""From 30 cm to 4.8 m: what pulls from two degrees away."""
+"""Blurs from 30 cm to 4.8 m, which pull from two degrees away."""
 NARROW = Blurs(0.7, 2)
-"""14 and 28 cm, about a line: what is exact."""
+"""Blurs of 14 and 28 cm, about a line, which are exact."""
 
 
 class GroundObjective:
@@ -79,7 +68,7 @@ class GroundObjective:
         stitch_weight: float,
         blurs: Blurs,
     ) -> None:
-        """`cameras` carry the stored poses; `responses` are their segmentations (H, W) in 0..1."""
+        """Take `cameras` with their stored poses, and `responses`, their segmentations (H, W) in 0..1."""
         self.blurs = blurs
         whole = _Grid.covering(pitch)
         window = _window([whole.visible(camera) for camera in cameras])
@@ -100,7 +89,7 @@ class GroundObjective:
         self.stitch_weight = stitch_weight if self.pairs else 0.0
 
     def losses(self, genomes: Array) -> Array:
-        """Losses (P,) of genomes (P, 6 N): per camera its rotation vector and position.
+        """Return losses (P,) of genomes (P, 6 N): per camera its rotation vector and position.
 
         One warp per individual and camera: OpenCV's warp is faster here than any array operation over the grid points
         of a whole population.
@@ -125,7 +114,7 @@ class GroundObjective:
         return float(self.stitch_weight * stitch + (1 - self.stitch_weight) * single)
 
     def _thickened(self, lines: Picture) -> list[Picture]:
-        """Of a picture (H, W) of lines, for each blur, 1 where it makes them at least half as high as it should."""
+        """Return, for each blur of lines (H, W), 1 where they are at least half as high as they should be."""
         return [
             _above(cv2.GaussianBlur(coarse, (0, 0), self.blurs.sigma_px, borderType=cv2.BORDER_CONSTANT), half)
             for coarse, half in zip(_pyramid(lines, self.blurs.count), self.half_heights, strict=True)
@@ -137,7 +126,7 @@ def _above(picture: Any, threshold: float) -> Picture:
 
 
 def _pyramid(picture: Picture, count: int) -> Iterator[Grey]:
-    """A picture (H, W) averaged over squares of 2, 4, 8 ... pixels a side."""
+    """Yield a picture (H, W) averaged over squares of 2, 4, 8 ... pixels a side."""
     # Once in bytes, which is fast; averages of broader squares would be rounded to nothing.
     coarse = _halved(picture).astype(np.float32)
     yield coarse
@@ -152,24 +141,26 @@ def _halved(picture: Any) -> Any:
 
 
 def _half_heights(line_width: float, blurs: Blurs) -> list[float]:
-    """Half of how bright, of 255, a line that is `line_width` metres broad is after each blur."""
+    """Return half of the brightness, of 255, of a line `line_width` metres broad after each blur."""
     widths = np.array([line_width * PIXELS_PER_METRE / 2**number for number in range(1, blurs.count + 1)])
     return [255 * height / 2 for height in blurred_line(widths, blurs.sigma_px)]
 
 
 def _coarsened(domain: Picture, count: int) -> list[Picture]:
-    """A mask (H, W) on the grids of `count` blurs."""
+    """Return a mask (H, W) on the grids of `count` blurs."""
     return [_above(coarse, 255 / 2) for coarse in _pyramid(domain, count)]
 
 
 def _widened(template: Sequence[Picture]) -> list[Picture]:
-    """A template's blurred lines and what is beside them."""
-    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * REACH_PX + 1, 2 * REACH_PX + 1))
+    """Return a template's blurred lines and what is beside them."""
+    # Distance from a blurred line of the template up to which a union reaches, in pixels of the grid of that blur.
+    reach_px = 8
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach_px + 1, 2 * reach_px + 1))
     return [np.asarray(cv2.dilate(lines, disc), dtype=np.uint8) for lines in template]
 
 
 def _unlike(a: Sequence[Picture], b: Sequence[Picture]) -> float:
-    """1 - IoU of two binary pictures, the mean over their blurs."""
+    """Return 1 - IoU of two binary pictures, the mean over their blurs."""
     return float(np.mean([_unlike_once(*pair) for pair in zip(a, b, strict=True)]))
 
 
@@ -184,7 +175,7 @@ def _within(pictures: Sequence[Picture], domain: Sequence[Picture]) -> list[Pict
 
 @dataclass(frozen=True)
 class _PinholeView:
-    """What an undistorted segmentation calls a line, 255, and the matrix (3, 3) of its pinhole camera."""
+    """Undistorted segmentation, 255 on a line, and the matrix (3, 3) of its pinhole camera."""
 
     marked: Picture
     matrix: Array
@@ -201,14 +192,16 @@ class _PinholeView:
             ]
         )
         rays = lens.undistort(border)
-        left_top = np.maximum(np.nanmin(rays, axis=0) * lens.matrix[0, 0], [-LARGEST_UNDISTORTED * width / 2] * 2)
-        right_bottom = np.minimum(np.nanmax(rays, axis=0) * lens.matrix[0, 0], [LARGEST_UNDISTORTED * width / 2] * 2)
+        # Largest width of undistorted frames, in widths of the frame; wider ones are cut.
+        largest_undistorted = 2.5
+        left_top = np.maximum(np.nanmin(rays, axis=0) * lens.matrix[0, 0], [-largest_undistorted * width / 2] * 2)
+        right_bottom = np.minimum(np.nanmax(rays, axis=0) * lens.matrix[0, 0], [largest_undistorted * width / 2] * 2)
         matrix = np.array([[lens.matrix[0, 0], 0, -left_top[0]], [0, lens.matrix[0, 0], -left_top[1]], [0, 0, 1]])
         size = np.ceil(right_bottom - left_top).astype(int) + 1
         x, y = np.meshgrid(np.arange(size[0]), np.arange(size[1]))
         plane = (np.stack([x, y], axis=-1) + left_top) / lens.matrix[0, 0]
         undistorted = bilinear(response, lens.distort(plane))
-        return cls((255 * (undistorted >= MARKED)).astype(np.uint8), matrix)
+        return cls((255 * (undistorted >= 0.5)).astype(np.uint8), matrix)
 
 
 @dataclass(frozen=True)
@@ -227,7 +220,8 @@ class _Grid:
 
     @classmethod
     def covering(cls, pitch: Field) -> _Grid:
-        origin = -np.array([pitch.length / 2 + MARGIN_M, pitch.width / 2 + MARGIN_M])
+        margin_m = 2.0
+        origin = -np.array([pitch.length / 2 + margin_m, pitch.width / 2 + margin_m])
         size = tuple(COARSEST * ceil(-2 * side * PIXELS_PER_METRE / COARSEST) for side in origin)
         columns, rows = np.meshgrid(np.arange(size[0]), np.arange(size[1]))
         surface = pitch.lift(origin + np.stack([columns, rows], axis=-1) / PIXELS_PER_METRE)
@@ -235,26 +229,28 @@ class _Grid:
         return cls(origin, size, planes, masks, surface)
 
     def within(self, window: tuple[slice, slice]) -> _Grid:
-        """A part of it."""
+        """Return a part of the grid."""
         rows, columns = window
         size = (columns.stop - columns.start, rows.stop - rows.start)
         origin = self.origin + np.array([columns.start, rows.start]) / PIXELS_PER_METRE
         return _Grid(origin, size, self.planes, [mask[window] for mask in self.on_plane], self.surface[window])
 
     def visible(self, camera: Camera) -> Picture:
-        """255 where `camera` sees the ground, and a line would be a line."""
+        """Return 255 where `camera` sees the ground, and a line would be a line."""
         seen = camera.sees(camera.project(self.surface))
         away = self.surface - camera.pose.position
         px_per_metre = camera.intrinsics.focal_length_px * -away[..., 2] / np.sum(away**2, axis=-1)
-        near = px_per_metre >= LEAST_PX_PER_METRE * camera.intrinsics.relative_size
+        # Least height in a 4K frame of a metre of ground, away from the camera, for it to count.
+        near = px_per_metre >= 6.0 * camera.intrinsics.relative_size
         return (255 * (seen & near)).astype(np.uint8)
 
     def lines(self, pitch: Field) -> Picture:
-        """White lines on black (H, W); a pixel that a line covers in part is grey."""
-        points = pitch.line_points(LINE_STEP_M)
-        across = (np.arange(LINE_SAMPLES) + 0.5) / LINE_SAMPLES - 0.5
+        """Return white lines on black (H, W); a pixel that a line covers in part is grey."""
+        points = pitch.line_points(0.02)
+        line_samples = 6
+        across = (np.arange(line_samples) + 0.5) / line_samples - 0.5
         covered = points.position[:, :2] + (across[:, None] * points.width)[..., None] * points.normal[:, :2]
-        area = np.broadcast_to(points.spacing * points.width / LINE_SAMPLES, covered.shape[:2])
+        area = np.broadcast_to(points.spacing * points.width / line_samples, covered.shape[:2])
         edges = [np.arange(side + 1) - 0.5 for side in self.size[::-1]]
         column, row = ((covered - self.origin) * PIXELS_PER_METRE).reshape(-1, 2).T
         share = PIXELS_PER_METRE**2 * np.histogram2d(row, column, edges, weights=area.ravel())[0]
@@ -262,7 +258,7 @@ class _Grid:
 
 
 def _window(domains: Sequence[Picture]) -> tuple[slice, slice]:
-    """Rows and columns that hold what is seen of a grid (H, W), as many as the coarsest blur asks for."""
+    """Return rows and columns that hold what is seen of a grid (H, W), as many as the coarsest blur asks for."""
     left, top, *extent = cv2.boundingRect(np.bitwise_or.reduce(domains))
     slices = []
     for start, length, whole in zip((top, left), extent[::-1], domains[0].shape, strict=True):
@@ -274,7 +270,7 @@ def _window(domains: Sequence[Picture]) -> tuple[slice, slice]:
 
 @dataclass(frozen=True)
 class _Warp:
-    """A view's segmentation on the grid, where the camera saw the ground at the start.
+    """Warp of a view's segmentation onto the grid, where the camera saw the ground at the start.
 
     One entry per plane of the roof: left and top of the box that holds what is seen of it, the mask (h, w) in that box,
     and the matrix (4, 3) that lifts a pixel of the box to a point (x, y, z, 1) of the plane.
@@ -301,7 +297,7 @@ class _Warp:
         return cls(view, domain.shape, boxes)
 
     def __call__(self, rotation: Array, position: Array) -> Picture:
-        """The grid (H, W), for a rotation (3, 3) and a position (3,)."""
+        """Return the grid (H, W), for a rotation (3, 3) and a position (3,)."""
         projection = self.view.matrix @ rotation @ np.column_stack([np.eye(3), -position])
         ground = np.zeros(self.shape, dtype=np.uint8)
         for left, top, mask, lift in self.boxes:
@@ -314,7 +310,7 @@ class _Warp:
 
 
 def _planes(surface: Array) -> tuple[Array, list[Picture]]:
-    """The planes (K, 3) that a lifted grid (H, W, 3) is made of, and for each the mask of its points."""
+    """Return the planes (K, 3) that a lifted grid (H, W, 3) is made of, and for each the mask of its points."""
     slope_y, slope_x = np.gradient(surface[..., 2], 1 / PIXELS_PER_METRE)
     offset = surface[..., 2] - slope_x * surface[..., 0] - slope_y * surface[..., 1]
     keys = np.round(np.stack([slope_x, slope_y, offset], axis=-1), 6)

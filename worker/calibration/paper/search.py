@@ -1,4 +1,4 @@
-"""The paper's search: the evolution strategy on the objective on the ground, from broad blurs to narrow ones."""
+"""Paper's search: the evolution strategy on the objective on the ground, from broad blurs to narrow ones."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ ALONE_ON_THE_GROUND = (
 )
 """Three times the mutation at first: with the paper's, cameras get half of the way from 2.1°."""
 ON_THE_GROUND = (*ALONE_ON_THE_GROUND, GroundLevel(NARROW, 0.5, alone=False, swings=True))
-"""The same, and then all cameras together."""
+"""Levels of `ALONE_ON_THE_GROUND`, and then all cameras together."""
 
 
 def search_on_ground(

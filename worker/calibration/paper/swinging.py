@@ -10,7 +10,7 @@ from worker.calibration.search.genome import GENES
 
 
 def looked_at(camera: Camera) -> Array:
-    """Where the optical axis meets the ground z = 0, (3,); below the camera if it does not."""
+    """Return the point (3,) where the optical axis meets the ground z = 0; below the camera if it does not."""
     position, axis = camera.pose.position, camera.pose.matrix[2]
     if axis[2] >= 0:
         return np.array([*position[:2], 0.0])
@@ -18,7 +18,7 @@ def looked_at(camera: Camera) -> Array:
 
 
 def swinging(genomes: Array, pivots: Array) -> Array:
-    """Genomes (..., 6 N) with the camera's place told as that of a pivot in its frame: R (p - C) for `pivots` (N, 3).
+    """Return genomes (..., 6 N) with the camera's place as that of a pivot in its frame: R (p - C) for `pivots` (N, 3).
 
     The `l` of the paper's K (R | l), with the origin on the ground that the camera looks at. A turn of such a genome
     swings the camera about the pivot: the two moves that a picture can hardly tell apart are one gene and not two.
@@ -30,7 +30,7 @@ def swinging(genomes: Array, pivots: Array) -> Array:
 
 
 def from_swinging(genomes: Array, pivots: Array) -> Array:
-    """Back from `swinging`: rotation vectors and positions C = p - R^T l."""
+    """Return genomes back from `swinging`: rotation vectors and positions C = p - R^T l."""
     poses = genomes.reshape(*genomes.shape[:-1], -1, GENES).copy()
     turned = np.swapaxes(rotation_matrices(poses[..., :3]), -1, -2) @ poses[..., 3:, None]
     poses[..., 3:] = pivots - turned[..., 0]

@@ -1,1 +1,1 @@
-"""From near the truth onto it: least squares over measured lines, and how sure that is."""
+"""Refinement: poses from near the truth onto measured lines by least squares, with covariances."""

@@ -1,9 +1,9 @@
-"""Whether sigmas are as large as errors: a camera by one half of its lines beside the same camera by the other half.
+"""Cross-check of sigmas: a camera by one half of its lines against the same camera by the other half.
 
 Every line is cut into stretches of ten metres; the even ones find pose and lens without the odd ones, and the other way
 round. How far apart the two put the farthest marking is a difference that anybody can check, and no sum of squares that
-both have part in. It should be about as large as the sigmas of both say, and much larger only where those are too
-small (mrcal calls this cross-validation; Kogan, "mrcal", 2021).
+both have part in. It should be about as large as the sigmas of both say, and much larger only where those are too small
+(mrcal calls this cross-validation; Kogan, "mrcal", 2021).
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from worker.calibration.detection.line_measurement import Measurements
 from worker.calibration.geometry.camera import Array, Camera
-from worker.calibration.geometry.derivatives import POSE_NUMBERS, ground_slopes_of_all
+from worker.calibration.geometry.derivatives import POSE_NUMBERS, full_ground_jacobian
 from worker.calibration.geometry.far_marking import farthest_marking
 from worker.calibration.geometry.field import Field
 from worker.calibration.refinement.estimate import Estimate
@@ -29,9 +29,9 @@ from worker.calibration.refinement.variance_components import Posterior
 
 @dataclass(frozen=True)
 class CrossCheck:
-    """How far apart (m, on the ground) the two halves of the lines put the farthest marking in view of a camera.
+    """Distance (m, on the ground) between the places of the farthest marking in view by the two halves of the lines.
 
-    `expected_m`: how far the sigmas of both say, one standard deviation.
+    `expected_m`: one standard deviation of it by the sigmas of both halves.
     """
 
     apart_m: float
@@ -39,49 +39,51 @@ class CrossCheck:
 
 
 class CrossChecks:
-    """Everything by the even stretches of the lines of tonight, and by the odd ones, at the scales that all chose.
+    """Split-half posteriors by even and odd stretches of tonight's lines, at the prior scales of the full fit.
 
-    It is worked out when it is first asked for: only the finish whose answer is kept needs it.
+    Computed on first use: only the refinement whose answer is kept needs it.
     """
 
     def __init__(
         self,
-        here: Estimate,
+        estimate: Estimate,
         measured: Sequence[Measurements],
-        believed: Priors,
+        priors: Priors,
         found: Posterior,
         heights: Array,
     ) -> None:
-        """`found` (A,) by all lines, on a ground of `heights` (K,)."""
-        self._here, self._believed, self._found, self._heights = here, believed, found, heights
+        """Take `found` (A,), the posterior by all lines, on a ground of `heights` (K,)."""
+        self._estimate, self._priors, self._found, self._heights = estimate, priors, found, heights
         self._halves = [[its[_stretch(its) % 2 == half] for its in measured] for half in (0, 1)]
 
     def of(self, number: int) -> CrossCheck | None:
         """Return the cross-check of a camera; None where one half is too short, or no marking is in view."""
         if min(len(half[number]) for half in self._halves) < FEWEST_MEASUREMENTS:
             return None
-        pose = self._believed.mixing[POSE_NUMBERS * number : POSE_NUMBERS * (number + 1)]
-        rows = np.concatenate([pose, self._believed.lens_tonight(number)])
+        pose = self._priors.mixing[POSE_NUMBERS * number : POSE_NUMBERS * (number + 1)]
+        rows = np.concatenate([pose, self._priors.lens_tonight(number)])
         difference, covariance = self._difference
-        return cross_check(self._here.pitch, self._here.cameras[number], rows @ difference, rows @ covariance @ rows.T)
+        return cross_check(
+            self._estimate.pitch, self._estimate.cameras[number], rows @ difference, rows @ covariance @ rows.T
+        )
 
     @cached_property
     def _difference(self) -> tuple[Array, Array]:
-        """How far apart (A,) the two halves put the errors, and the covariance (A, A) that this is expected to have."""
-        here, believed, found, heights = self._here, self._believed, self._found, self._heights
-        changes = believed.mixing @ found.value
+        """Difference (A,) between the errors by the two halves, and the covariance (A, A) expected of it."""
+        estimate, priors, found, heights = self._estimate, self._priors, self._found, self._heights
+        changes = priors.mixing @ found.value
         # The ground is one unknown more: what it swells by is the same under both halves.
-        mixing, prior = _with_ground(believed.mixing, found.certainty, here.ground_precision(believed.unknowns))
+        mixing, prior = _with_ground(priors.mixing, found.certainty, estimate.ground_precision(priors.unknowns))
         mean = np.concatenate([found.mean, np.zeros(len(heights))])
         values, covariances, noises = list[Array](), list[Array](), list[Array]()
         for half in self._halves:
-            said = LineLikelihood(here, half, [None] * len(half), believed.unknowns).sandwich_at(changes, heights)
-            covariance = np.asarray(np.linalg.inv(mixing.T @ said.bread @ mixing + prior), dtype=float)
-            pull = said.bread @ np.concatenate([changes, heights]) - said.gradient
-            values.append(covariance @ (mixing.T @ pull + prior @ mean))
+            sandwich = LineLikelihood(estimate, half, [None] * len(half), priors.unknowns).sandwich_at(changes, heights)
+            covariance = np.asarray(np.linalg.inv(mixing.T @ sandwich.bread @ mixing + prior), dtype=float)
+            information_vector = sandwich.bread @ np.concatenate([changes, heights]) - sandwich.gradient
+            values.append(covariance @ (mixing.T @ information_vector + prior @ mean))
             covariances.append(covariance)
-            noises.append(covariance @ (mixing.T @ said.spread @ mixing) @ covariance)
-        # What both believe before any line is the same error in both, and they differ in how far they follow it.
+            noises.append(covariance @ (mixing.T @ sandwich.spread @ mixing) @ covariance)
+        # The prior's error is the same in both, and they differ in how far they follow it.
         shared = covariances[0] - covariances[1]
         errors = len(found.value)
         difference = values[0] - values[1]
@@ -90,10 +92,10 @@ class CrossChecks:
 
 
 def cross_check(pitch: Field, camera: Camera, difference: Array, covariance: Array) -> CrossCheck | None:
-    """What a `difference` (12,) of pose and `LENS_NUMBERS`, of this covariance (12, 12), is at the farthest marking."""
-    slopes = ground_slopes_of_all(camera, farthest_marking(pitch, camera))
-    apart = np.linalg.norm(slopes @ difference, axis=-1)
-    variance = np.einsum("nij,jk,nik->n", slopes, covariance, slopes)
+    """Propagate a `difference` (12,) of pose and `LENS_PARAMETERS`, of a covariance, to the farthest marking."""
+    jacobian = full_ground_jacobian(camera, farthest_marking(pitch, camera))
+    apart = np.linalg.norm(jacobian @ difference, axis=-1)
+    variance = np.einsum("nij,jk,nik->n", jacobian, covariance, jacobian)
     known = np.isfinite(apart) & np.isfinite(variance)
     if not known.any():
         return None
@@ -101,14 +103,14 @@ def cross_check(pitch: Field, camera: Camera, difference: Array, covariance: Arr
 
 
 def _stretch(measured: Measurements) -> NDArray[np.intp]:
-    """In which ten metres of line (M,) each was measured."""
+    """Return the index (M,) of the ten metres of line in which each point was measured."""
     return measured.index // CLUSTER_POINTS
 
 
 def _with_ground(mixing: Array, certainty: Array, ground: Array) -> tuple[Array, Array]:
-    """The mixing (D + K, A + K) and prior information (A + K, A + K) of the errors, those of the ground among them.
+    """Return mixing (D + K, A + K) and prior information (A + K, A + K) of the errors with the ground among them.
 
-    `certainty` (A,) on the errors, `ground` (K, K) on the heights.
+    `certainty` (A,): information on the errors, `ground` (K, K): on the heights.
     """
     (dense, errors), nodes = mixing.shape, len(ground)
     both, prior = np.zeros((dense + nodes, errors + nodes)), np.zeros((errors + nodes, errors + nodes))

@@ -1,4 +1,4 @@
-"""What a calibration says of the numbers it was given: a lens or a field that the lines contradict, in words."""
+"""Diagnosis: given parameters of a lens or the field that the lines contradict, in words."""
 
 from __future__ import annotations
 
@@ -7,10 +7,6 @@ from dataclasses import dataclass, field
 
 from worker.calibration.refinement.uncertainty import Deviation
 
-SURE = 3.0
-"""A number is suspected when it is off by this many of the estimate's sigma..."""
-NOTABLE = 3.0
-"""...and by this many times what is left after a good calibration."""
 MORE_OR_LESS = {
     "focal_length_px": ("a focal length", "px longer", "px shorter"),
     "principal_point_x_px": ("a principal point", "px farther right", "px farther left"),
@@ -27,9 +23,9 @@ MORE_OR_LESS = {
 
 @dataclass(frozen=True)
 class Suspicion:
-    """A number of a camera's lens, or of the field (`camera` None), that seems wrong by `deviation` ± `sigma`.
+    """Parameter of a camera's lens, or of the field (`camera` None), that seems wrong by `deviation` ± `sigma`.
 
-    `moves_m`: of a number of the field, how far each camera's position would move (m) with the field put right, by id.
+    `moves_m`: for a parameter of the field, the move of each camera's position (m) with the field corrected, by id.
     """
 
     camera: str | None
@@ -41,15 +37,16 @@ class Suspicion:
 
 
 def find_suspicions(deviations: Sequence[Deviation]) -> list[Suspicion]:
-    """What the lines contradict, each with its numbers and what to do."""
+    """Return the parameters that the lines contradict, each with its estimate and what to do."""
     return [
         Suspicion(d.camera, d.name, d.value, d.sigma, _detail(d), moves_m=d.moves_m) for d in deviations if is_sure(d)
     ]
 
 
 def is_sure(deviation: Deviation) -> bool:
-    """Whether the lines contradict a number that was given."""
-    return abs(deviation.value) > max(SURE * deviation.sigma, NOTABLE * deviation.expected)
+    """True if the lines contradict a given parameter."""
+    # Three sigmas of the estimate, and three of a good calibration.
+    return abs(deviation.value) > max(3.0 * deviation.sigma, 3.0 * deviation.expected)
 
 
 def _detail(found: Deviation) -> str:

@@ -1,4 +1,4 @@
-"""Where a least squares over everything unknown stands, and its steps: cameras, pitch, and the ground under it.
+"""Estimate of all unknowns, and its Gauss-Newton steps: cameras, field, and the ground under it.
 
 A weak prior holds each camera near where it was when the lines were caught. Where lines tell something it changes
 nothing. Where they do not (a lone touchline) it keeps the camera from running away along them, and the covariance says
@@ -21,15 +21,16 @@ from worker.calibration.refinement.least_squares import Rows, normal_equations, 
 from worker.calibration.refinement.unknowns import Unknowns
 from worker.calibration.robust import Weigh
 
-PRIOR_RAD, PRIOR_M = 0.03, 1.0
-"""Standard deviation, per axis, of where a camera is before any line is measured."""
+POSE_SIGMA: Array = np.repeat([0.03, 1.0], 3)
+"""Standard deviation (6,) of a camera's pose before any line is measured: rad and m per axis. It holds the directions
+of which lines say nothing."""
 TURN_M = 30.0
-"""A turn counts as the shift of what the camera sees at this distance."""
+"""Distance at which a turn counts as the shift of what the camera sees."""
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """Where the finish stands: cameras and pitch, with `values` (E,) in them, and `heights` (K,) of the ground.
+    """Current cameras and field of the refinement, parameter `values` (E,) in them, and `heights` (K,) of the ground.
 
     `lines`: the pitch's line points, as many as it had in the beginning; `uneven_m`: a standard deviation of the
     heights.
@@ -43,8 +44,8 @@ class Estimate:
     uneven_m: float
 
     @classmethod
-    def at(cls, pitch: Field, cameras: Sequence[Camera], unknowns: Unknowns) -> Estimate:
-        """Before any step."""
+    def initial(cls, pitch: Field, cameras: Sequence[Camera], unknowns: Unknowns) -> Estimate:
+        """Return the estimate before any step."""
         return cls(
             pitch,
             pitch.line_points(),
@@ -55,12 +56,12 @@ class Estimate:
         )
 
     def on_ground(self, unknowns: Unknowns) -> LinePoints:
-        """The line points of the pitch, on its ground."""
+        """Return the line points of the field, on its ground."""
         up = unknowns.ground.under_points(self.heights, np.arange(len(self.lines)))
         return replace(self.lines, position=self.lines.position + up[:, None] * [0.0, 0.0, 1.0])
 
     def moved(self, move: Array, unknowns: Unknowns) -> Estimate:
-        """After a step (U,)."""
+        """Return the estimate after a step (U,)."""
         poses, values, heights = np.split(move, [POSE_NUMBERS * unknowns.views, unknowns.dense])
         pitch, cameras = self.pitch, self.cameras
         for parameter, by in zip(unknowns.parameters, values.tolist(), strict=True):
@@ -73,58 +74,60 @@ class Estimate:
         return replace(self, pitch=pitch, lines=lines, cameras=cameras, values=values, heights=heights)
 
     def largest_move_m(self, other: Estimate) -> float:
-        """How far, in metres, the view that moved most is from where it was in another estimate; turns as `TURN_M`."""
+        """Return the largest move (m) of a view between two estimates; turns as shifts at `TURN_M`."""
         changes = [change_between(a, b) for a, b in zip(self.cameras, other.cameras, strict=True)]
         return max(float(np.linalg.norm(c[3:]) + TURN_M * np.linalg.norm(c[:3])) for c in changes)
 
     def prior(self, unknowns: Unknowns) -> Array:
-        """Information (U, U) on every unknown before any line is measured."""
-        known = np.zeros((len(unknowns), len(unknowns)))
+        """Return the information (U, U) on all unknowns before any line is measured."""
+        information = np.zeros((len(unknowns), len(unknowns)))
         poses = POSE_NUMBERS * unknowns.views
-        known[:poses, :poses] = self.weak_prior()
-        known[poses : unknowns.dense, poses : unknowns.dense] = np.diag([p.expected**-2 for p in unknowns.parameters])
-        known[unknowns.dense :, unknowns.dense :] = self.ground_precision(unknowns)
-        return known
+        information[:poses, :poses] = self.weak_prior()
+        information[poses : unknowns.dense, poses : unknowns.dense] = np.diag(
+            [p.expected**-2 for p in unknowns.parameters]
+        )
+        information[unknowns.dense :, unknowns.dense :] = self.ground_precision(unknowns)
+        return information
 
     def ground_precision(self, unknowns: Unknowns) -> Array:
-        """Information (K, K) on the heights of the ground before any line is measured."""
+        """Return the information (K, K) on the heights of the ground before any line is measured."""
         return np.asarray(unknowns.ground.precision / self.uneven_m**2, dtype=float)
 
     def weak_prior(self) -> Array:
-        """Information (6 V, 6 V) on the poses before any line is measured."""
-        return np.diag(([PRIOR_RAD**-2] * 3 + [PRIOR_M**-2] * 3) * len(self.cameras))
+        """Return the information (6 V, 6 V) on the poses before any line is measured."""
+        return np.diag(np.tile(POSE_SIGMA**-2, len(self.cameras)))
 
     def change_from(self, found: Sequence[Camera]) -> Array:
-        """How far (U,) every unknown is from where it was `found` by the search or given."""
+        """Return the change (U,) of all unknowns from where they were `found` by the search or given."""
         changes = [change_between(before, now) for before, now in zip(found, self.cameras, strict=True)]
         return np.concatenate([*changes, self.values, self.heights])
 
     def rows(self, measured: Sequence[Measurements], unknowns: Unknowns) -> list[Rows]:
-        """The measurements of every view against its pose."""
+        """Return the rows of every view's measurements at its pose."""
         return rows_of(self.lines.position, self.cameras, measured, unknowns)
 
 
 @dataclass(frozen=True)
 class GaussNewtonStep:
-    """Where a Gauss-Newton step leads: the `move` (U,), and the `covariance` (U, U) of everything unknown before it."""
+    """Result of a Gauss-Newton step `to` an estimate: the `move` (U,), and the `covariance` (U, U) before it."""
 
     to: Estimate
     move: Array
     covariance: Array
 
     def unevenness(self, unknowns: Unknowns, before: Belief) -> float:
-        """How uneven a ground the heights speak for, a standard deviation in metres; `before`: what was thought."""
+        """Return the standard deviation (m) of the ground that the heights speak for; `before`: the prior."""
         of_heights = self.covariance[unknowns.dense :, unknowns.dense :]
         return unknowns.ground.unevenness(self.to.heights, of_heights, self.to.uneven_m, before)
 
 
 def gauss_newton_step(
-    here: Estimate, found: Sequence[Camera], measured: Sequence[Measurements], unknowns: Unknowns, weigh: Weigh
+    estimate: Estimate, found: Sequence[Camera], measured: Sequence[Measurements], unknowns: Unknowns, weigh: Weigh
 ) -> GaussNewtonStep:
-    """One Gauss-Newton step for everything together; `found`: where the weak prior holds the cameras."""
-    equations = normal_equations(weigh_rows(here.rows(measured, unknowns), here.heights, unknowns, weigh))
-    prior = here.prior(unknowns)
-    pull = equations.gradient + prior @ here.change_from(found)
+    """Take one Gauss-Newton step for all unknowns; `found`: poses at which the weak prior is centred."""
+    equations = normal_equations(weigh_rows(estimate.rows(measured, unknowns), estimate.heights, unknowns, weigh))
+    prior = estimate.prior(unknowns)
+    gradient = equations.gradient + prior @ estimate.change_from(found)
     covariance = np.asarray(np.linalg.inv(equations.information + prior), dtype=float)
-    move = -covariance @ pull
-    return GaussNewtonStep(here.moved(move, unknowns), move, covariance)
+    move = -covariance @ gradient
+    return GaussNewtonStep(estimate.moved(move, unknowns), move, covariance)

@@ -1,4 +1,4 @@
-"""The least squares of the finish: line measurements of several views, with their unknown errors of paint and ground.
+"""Least squares of the refinement: line measurements of several views, with their unknown errors of paint and ground.
 
 The offset of a measured line point from where its view expects it is (docs/model.md, 2)
 
@@ -22,23 +22,21 @@ from numpy.typing import NDArray
 from worker.calibration.detection.line_measurement import PAINT_M, Measurements
 from worker.calibration.geometry.camera import Array, Camera
 from worker.calibration.geometry.ground import Ground
-from worker.calibration.geometry.lens import LENS_NUMBERS
+from worker.calibration.geometry.lens import LENS_PARAMETERS
 from worker.calibration.geometry.parameters import FieldParameter, LensParameter, Parameter
 from worker.calibration.refinement.unknowns import Unknowns
 from worker.calibration.robust import USUAL, Weigh, tukey_weights
 
 FEWEST_MEASUREMENTS = 30
 CLUSTER_POINTS = 40
-"""Line points (25 cm apart) whose errors of paint, lens and measurement are taken as one."""
-LEAST_BELIEF = 1e-3
-"""A line point whose rows are all disbelieved may lie anywhere."""
+"""Number of line points (25 cm apart) whose errors of paint, lens and measurement are taken as one."""
 LEAST_NOISE = 0.2
-"""Part of the expected errors that the gradient varies by at least: no picture is perfect."""
+"""Least part of the expected errors by which the gradient varies: no picture is perfect."""
 
 
 @dataclass(frozen=True)
 class Rows:
-    """M measurements of one view against its pose.
+    """M measurements of one view, linearised at its pose.
 
     `offset` (M,) px, measured minus expected; `jacobian` (M, n) of it by the dense unknowns `columns` (n,); `across`
     and `up` (M,) px per metre of paint that lies beside its place, or above it; `noise_px` (M,); `trust` (M,) 0..1;
@@ -56,22 +54,22 @@ class Rows:
     measured: Measurements
 
     def shifted(self, changes: Array, heights: Array, unknowns: Unknowns) -> Rows:
-        """The same rows after changes (D,) of the dense unknowns, on a ground of `heights` (K,).
+        """Return the rows after changes (D,) of the dense unknowns, on a ground of `heights` (K,).
 
-        What nothing explains is less where a lens that was wrong has been put right.
+        The misfit is smaller where a lens that was wrong has been corrected.
         """
         offset = self.offset + self.jacobian @ changes[self.columns]
-        left = offset - self.up * unknowns.ground.under_points(heights, self.point)
-        noise_px = replace(self.measured, misfit_px=misfit_px(left, self.measured)).noise_px
+        residual = offset - self.up * unknowns.ground.under_points(heights, self.point)
+        noise_px = replace(self.measured, misfit_px=misfit_px(residual, self.measured)).noise_px
         return replace(self, offset=offset, noise_px=noise_px)
 
     @classmethod
     def of(cls, positions: Array, camera: Camera, view: int, measured: Measurements, unknowns: Unknowns) -> Rows:
-        """The measurements of view number `view`; `positions` (N, 3): where the field has its line points."""
+        """Return the rows of view number `view`; `positions` (N, 3): places of the field's line points."""
         here = positions[measured.index]
         parameters = unknowns.parameters_of(view)
         columns = np.array([*range(*unknowns.pose(view).indices(len(unknowns))), *(n for n, _ in parameters)], np.intp)
-        by_pose = measured.slopes(camera, here)
+        by_pose = measured.jacobian(camera, here)
         by_parameters = _by_parameters(by_pose, here, camera, measured, [parameter for _, parameter in parameters])
         jacobian = np.concatenate([by_pose, by_parameters], axis=1)
         offset = measured.offset(camera, here)
@@ -93,25 +91,25 @@ class Rows:
 def _by_parameters(
     by_pose: Array, points: Array, camera: Camera, measured: Measurements, parameters: Sequence[Parameter]
 ) -> Array:
-    """The derivative (M, E) of the offsets from `points` (M, 3) by numbers of lens and field, px per unit of each.
+    """Jacobian (M, E) of the offsets from `points` (M, 3) by parameters of lens and field, px per unit of each.
 
     `by_pose` (M, 6): that by the pose.
     """
-    slopes = np.empty((len(measured), len(parameters)))
-    lens = {at: LENS_NUMBERS.index(p.name) for at, p in enumerate(parameters) if isinstance(p, LensParameter)}
+    jacobian = np.empty((len(measured), len(parameters)))
+    lens = {at: LENS_PARAMETERS.index(p.name) for at, p in enumerate(parameters) if isinstance(p, LensParameter)}
     if lens:
-        slopes[:, list(lens)] = measured.lens_slopes(camera, points)[:, list(lens.values())]
+        jacobian[:, list(lens)] = measured.lens_jacobian(camera, points)[:, list(lens.values())]
     for at, parameter in enumerate(parameters):
         if isinstance(parameter, FieldParameter):
             # A point that moves is a camera that moves the other way.
-            slopes[:, at] = -np.sum(by_pose[:, 3:] * parameter.shift[measured.index], axis=1)
-    return slopes
+            jacobian[:, at] = -np.sum(by_pose[:, 3:] * parameter.shift[measured.index], axis=1)
+    return jacobian
 
 
 def rows_of(
     positions: Array, cameras: Sequence[Camera], measured: Sequence[Measurements], unknowns: Unknowns
 ) -> list[Rows]:
-    """The rows of all views that have enough measurements; `positions` (N, 3): where the field has its line points."""
+    """Return the rows of all views that have enough measurements; `positions` (N, 3) of the field's line points."""
     return [
         Rows.of(positions, camera, view, found, unknowns)
         for view, (camera, found) in enumerate(zip(cameras, measured, strict=True))
@@ -123,11 +121,11 @@ def rows_of(
 class WeightedRows:
     """Rows of several views with their weights, on a ground of known heights; M rows of all views, P line points.
 
-    `residual` (M,) px; `points` (P,) and `at` (M,): which of the line points the rows are about; `shared` (M,): whether
+    `residual` (M,) px; `points` (P,) and `at` (M,): which of the line points the rows are about; `shared` (M,): True if
     other rows are about the same one; `weight` (M,) 1 / px²: of a shared point that of the measurement alone, of
     another with all that it may be off by. `local` (M, 2) px per metre of (e, r); `precision` (P, 2, 2) of those given
-    the rows, and `beside` (P, 2) m, what they then are. `value` (M,): the residual in units of everything it may be
-    off by, and `belief` (M,), its robust weight.
+    the rows, and `paint_mean` (P, 2) m. `value` (M,): the residual in units of everything it may be off by, and
+    `belief` (M,), its robust weight.
     """
 
     rows: Sequence[Rows]
@@ -139,12 +137,12 @@ class WeightedRows:
     weight: Array
     local: Array
     precision: Array
-    beside: Array
+    paint_mean: Array
     value: Array
     belief: Array
 
     def parts(self) -> list[slice]:
-        """Which of the M rows are those of each view."""
+        """Return the slice of the M rows of each view."""
         ends = np.cumsum([0, *(len(rows.offset) for rows in self.rows)]).tolist()
         return [slice(first, last) for first, last in pairwise(ends)]
 
@@ -154,34 +152,34 @@ class WeightedRows:
         return self.local[:, 1]
 
     @property
-    def drawn_together(self) -> Array:
-        """How much (M, 2) the rows of a shared point give way to each other: the products of two rows say by how much
-        the point, wherever it lies, takes from what they tell apart; 0 of a point that one view alone measures."""
-        drawn = np.zeros((len(self.at), 2))
+    def schur_factor(self) -> Array:
+        """Factor (M, 2) of the rank-2 term that eliminating a shared point's paint error subtracts from its rows'
+        information; 0 for a point that one view alone measures."""
+        factor = np.zeros((len(self.at), 2))
         at = self.at[self.shared]
         root = np.linalg.cholesky(np.linalg.inv(self.precision))[at]
         heavy = self.local[self.shared] * self.weight[self.shared, None]
-        drawn[self.shared] = np.sum(root * heavy[:, :, None], axis=1)
-        return drawn
+        factor[self.shared] = np.sum(root * heavy[:, :, None], axis=1)
+        return factor
 
     @property
-    def left(self) -> Array:
-        """What is left (M,) px of the residuals of shared points when those lie where all their rows say together."""
-        return self.residual - self.shared * np.sum(self.local * self.beside[self.at], axis=1)
+    def residual_given_paint(self) -> Array:
+        """Residuals (M,) px given the paint: with shared points at the mean place that all their rows say."""
+        return self.residual - self.shared * np.sum(self.local * self.paint_mean[self.at], axis=1)
 
 
 def weigh_rows(rows: Sequence[Rows], heights: Array, unknowns: Unknowns, weigh: Weigh) -> WeightedRows:
     """Weigh rows robustly: each by all that it may be off by, and those that share a point by each other.
 
     Where a shared point is far off in the views that see it alike, it is the paint and not the measurements: it may lie
-    farther beside its place, and they say no less about each other. `heights` (K,): of the ground's nodes.
+    farther from its place, and they say no less about each other. `heights` (K,): of the ground's nodes.
     """
     ground = unknowns.ground
     point = _joined([r.point for r in rows]).astype(np.intp)
     local = np.stack([_joined([r.across for r in rows]), _joined([r.up for r in rows])], axis=1)
     residual = _joined([r.offset for r in rows]) - local[:, 1] * ground.under_points(heights, point)
     noise = _joined([r.noise_px for r in rows]) ** 2
-    # Of paint beside its place, and of the ground under it beside the smooth ground, m².
+    # Prior variance of the paint across the line, and of the ground under it beside the smooth ground, m².
     by_itself = np.array([PAINT_M**2, ground.usual_m**2])
     expected = noise + (local**2) @ by_itself
     value = residual / np.sqrt(expected)
@@ -191,82 +189,87 @@ def weigh_rows(rows: Sequence[Rows], heights: Array, unknowns: Unknowns, weigh: 
     shared = seen_by[at] > 1
     trust = _joined([r.trust for r in rows])
     of_point = np.bincount(at, belief, len(points)) / np.maximum(np.bincount(at, trust, len(points)), 1e-12)
-    variance = by_itself / np.clip(of_point, LEAST_BELIEF, 1.0)[:, None]
+    # A point whose rows are all outliers may lie anywhere.
+    variance = by_itself / np.clip(of_point, 1e-3, 1.0)[:, None]
     weight = np.where(shared, trust / noise, belief / expected)
-    precision, beside = _beside(local, weight, residual, at, variance)
+    precision, paint_mean = _paint_posterior(local, weight, residual, at, variance)
     if shared.any():
-        apart = (residual - np.sum(local * beside[at], axis=1)) / np.sqrt(noise)
-        weight[shared] *= weigh(apart[shared])
-        precision, beside = _beside(local, weight, residual, at, variance)
-    return WeightedRows(rows, unknowns, residual, points, at, shared, weight, local, precision, beside, value, belief)
+        normalised = (residual - np.sum(local * paint_mean[at], axis=1)) / np.sqrt(noise)
+        weight[shared] *= weigh(normalised[shared])
+        precision, paint_mean = _paint_posterior(local, weight, residual, at, variance)
+    return WeightedRows(
+        rows, unknowns, residual, points, at, shared, weight, local, precision, paint_mean, value, belief
+    )
 
 
-def _beside(local: Array, weight: Array, residual: Array, at: NDArray[np.intp], variance: Array) -> tuple[Array, Array]:
-    """Precision (P, 2, 2) and mean (P, 2), m, of what each line point is off by, if all else is right.
+def _paint_posterior(
+    local: Array, weight: Array, residual: Array, at: NDArray[np.intp], variance: Array
+) -> tuple[Array, Array]:
+    """Return precision (P, 2, 2) and mean (P, 2), m, of each line point's paint error, all else fixed.
 
-    `variance` (P, 2) m²: of that before it is measured.
+    `variance` (P, 2) m²: the prior of it.
     """
     count = len(variance)
     precision = np.empty((count, 2, 2))
     for n in (0, 1):
         precision[:, n, n] = 1 / variance[:, n] + np.bincount(at, weight * local[:, n] ** 2, count)
     precision[:, 0, 1] = precision[:, 1, 0] = np.bincount(at, weight * local[:, 0] * local[:, 1], count)
-    pull = np.stack([np.bincount(at, weight * residual * local[:, n], count) for n in (0, 1)], axis=1)
-    return precision, np.asarray(np.linalg.solve(precision, pull[..., None])[..., 0], dtype=float)
+    information_vector = np.stack([np.bincount(at, weight * residual * local[:, n], count) for n in (0, 1)], axis=1)
+    return precision, np.asarray(np.linalg.solve(precision, information_vector[..., None])[..., 0], dtype=float)
 
 
 @dataclass(frozen=True)
 class NormalEquations:
-    """`information` (U, U) on all unknowns and the `gradient` (U,) of half the weighted squares."""
+    """Normal equations: `information` (U, U) on all unknowns and the `gradient` (U,) of half the weighted squares."""
 
     information: Array
     gradient: Array
 
 
 def normal_equations(of: WeightedRows) -> NormalEquations:
-    """The sums over all rows, paint and roughness of each line point eliminated (docs/model.md, 3).
+    """Sum the normal equations over all rows, the paint error of each line point eliminated (docs/model.md, 3).
 
-    All rows of a line point move with the ground under it, which is summed by points; poses and numbers are summed by
-    views, and by pairs of views that share points.
+    All rows of a line point move with the ground under it, which is summed by points; poses and parameters are summed
+    by views, and by pairs of views that share points.
     """
     unknowns, dense = of.unknowns, of.unknowns.dense
-    drawn = of.drawn_together
+    factor = of.schur_factor
     information = np.zeros((len(unknowns), len(unknowns)))
     gradient = np.zeros(len(unknowns))
-    pull = of.weight * of.left
-    risen = np.stack([_summed(of.at, -of.up * drawn[:, n], len(of.points)) for n in (0, 1)], axis=1)
-    by_ground = -of.weight * of.up - np.sum(drawn * risen[of.at], axis=1)
-    alone = of.weight - np.sum(drawn**2, axis=1)
+    weighted_residual = of.weight * of.residual_given_paint
+    risen = np.stack([_summed(of.at, -of.up * factor[:, n], len(of.points)) for n in (0, 1)], axis=1)
+    by_ground = -of.weight * of.up - np.sum(factor * risen[of.at], axis=1)
+    alone = of.weight - np.sum(factor**2, axis=1)
     for rows, part in zip(of.rows, of.parts(), strict=True):
         columns, jacobian = rows.columns, rows.jacobian
         information[np.ix_(columns, columns)] += (jacobian * alone[part, None]).T @ jacobian
-        gradient[columns] += jacobian.T @ pull[part]
+        gradient[columns] += jacobian.T @ weighted_residual[part]
         across = _by_node(unknowns.ground, rows.point, jacobian * by_ground[part, None])
         information[columns, dense:] += across.T
         information[dense:, columns] += across
     for (one, first), (other, second) in combinations(zip(of.rows, of.parts(), strict=True), 2):
         _, at, there = np.intersect1d(one.point, other.point, assume_unique=True, return_indices=True)
-        together = np.sum(drawn[first][at] * drawn[second][there], axis=1)
+        together = np.sum(factor[first][at] * factor[second][there], axis=1)
         coupled = (one.jacobian[at] * together[:, None]).T @ other.jacobian[there]
         information[np.ix_(one.columns, other.columns)] -= coupled
         information[np.ix_(other.columns, one.columns)] -= coupled.T
     level = _summed(of.at, of.weight * of.up**2, len(of.points)) - np.sum(risen**2, axis=1)
     information[dense:, dense:] = _between_nodes(unknowns.ground, of.points, level)
-    gradient[dense:] = _by_node(unknowns.ground, of.points, -_summed(of.at, of.up * pull, len(of.points))[:, None])[
-        :, 0
-    ]
+    gradient[dense:] = _by_node(
+        unknowns.ground, of.points, -_summed(of.at, of.up * weighted_residual, len(of.points))[:, None]
+    )[:, 0]
     return NormalEquations(information, gradient)
 
 
 def _by_node(ground: Ground, points: NDArray[np.intp], values: Array) -> Array:
-    """Values (M, n) at line points (M,), shared out between the nodes (K, n) of the ground under them."""
+    """Distribute values (M, n) at line points (M,) over the nodes (K, n) of the ground under them."""
     node, share = ground.node[points].ravel(), ground.share[points]
     by_column = [_summed(node, (share * column[:, None]).ravel(), len(ground)) for column in values.T]
     return np.stack(by_column, axis=1) if by_column else np.zeros((len(ground), 0))
 
 
 def _between_nodes(ground: Ground, points: NDArray[np.intp], values: Array) -> Array:
-    """The sum (K, K) over line points (P,) of a value (P,) times the outer square of their shares of the nodes."""
+    """Return the sum (K, K) over line points (P,) of a value (P,) times the outer square of their shares."""
     node, share, size = ground.node[points], ground.share[points], len(ground)
     pair = node[:, :, None] * size + node[:, None, :]
     squares = values[:, None, None] * share[:, :, None] * share[:, None, :]
@@ -274,36 +277,38 @@ def _between_nodes(ground: Ground, points: NDArray[np.intp], values: Array) -> A
 
 
 def _summed(at: NDArray[np.intp], values: Array, size: int) -> Array:
-    """Values (M,) added up by where (M,) each belongs, (size,)."""
+    """Return sums (size,) of values (M,) by their index (M,)."""
     return np.asarray(np.bincount(at, values, size), dtype=float)
 
 
 def error_of_measurement(of: WeightedRows, information: Array) -> Array:
-    """Covariance (U, U) of the gradient by the residuals themselves, those of ten metres of line taken as one.
+    """Return the covariance (U, U) of the gradient by the residuals themselves, clustered by ten metres of line.
 
     Neighbours on a line share the error of its paint and of the lens, so they are not as many as they seem (the
     sandwich of Liang and Zeger, 1986). On top, a fifth of what their expected errors say.
     """
-    by_cluster = _pulls(of)
+    by_cluster = _cluster_gradients(of)
     usual = float(np.sum(of.belief**2) / max(float(np.sum(of.belief)), 1e-12))
     return np.asarray(by_cluster.T @ by_cluster + LEAST_NOISE * usual * information)
 
 
-def _pulls(of: WeightedRows) -> Array:
-    """The part (C, U) of the gradient that each ten metres of line have, over all views."""
+def _cluster_gradients(of: WeightedRows) -> Array:
+    """Return the part (C, U) of the gradient of each ten metres of line, over all views."""
     unknowns, ground = of.unknowns, of.unknowns.ground
     clusters, cluster_of = np.unique(of.points // CLUSTER_POINTS, return_inverse=True)
     count, size = len(clusters), len(ground)
-    cluster, pull = cluster_of[of.at], of.weight * of.left
-    found = np.zeros((count, len(unknowns)))
+    cluster, weighted_residual = cluster_of[of.at], of.weight * of.residual_given_paint
+    gradients = np.zeros((count, len(unknowns)))
     for rows, part in zip(of.rows, of.parts(), strict=True):
-        for column, slopes in zip(rows.columns, rows.jacobian.T, strict=True):
-            found[:, column] += _summed(cluster[part], slopes * pull[part], count)
+        for column, derivatives in zip(rows.columns, rows.jacobian.T, strict=True):
+            gradients[:, column] += _summed(cluster[part], derivatives * weighted_residual[part], count)
     node, share = ground.node[of.points], ground.share[of.points]
-    risen = -_summed(of.at, of.up * pull, len(of.points))
+    risen = -_summed(of.at, of.up * weighted_residual, len(of.points))
     pair = cluster_of[:, None] * size + node
-    found[:, unknowns.dense :] = _summed(pair.ravel(), (share * risen[:, None]).ravel(), count * size).reshape(-1, size)
-    return found
+    gradients[:, unknowns.dense :] = _summed(pair.ravel(), (share * risen[:, None]).ravel(), count * size).reshape(
+        -1, size
+    )
+    return gradients
 
 
 def _joined(parts: Sequence[Array | NDArray[np.intp]]) -> Array:
@@ -315,7 +320,7 @@ def _split(values: Array, rows: Sequence[Rows]) -> list[Array]:
 
 
 def rms_px(positions: Array, camera: Camera, measured: Measurements) -> float | None:
-    """Rms of the distances of the lines of one camera from the field's `positions` (N, 3), but for outliers.
+    """Return the rms distance of the lines of one camera from the field's `positions` (N, 3), without outliers.
 
     None where it has too few.
     """
@@ -329,7 +334,7 @@ def rms_px(positions: Array, camera: Camera, measured: Measurements) -> float | 
 
 
 def misfit_px(offset: Array, measured: Measurements) -> float:
-    """The further error, in px, that makes the usual one of the offsets (M,) of measurements what is expected.
+    """Return the further error, in px, that makes the usual offset (M,) of measurements the expected one.
 
     0 where noise, paint and ground explain them. By the median: outliers say nothing of how well a lens is known.
     """
@@ -338,6 +343,6 @@ def misfit_px(offset: Array, measured: Measurements) -> float:
         return 0.0
     offset, measured = offset[known], measured[known]
     explained = measured.sigma_px**2 - measured.misfit_px**2 * measured.alike
-    # What each offset would need for itself to be a usual one; half of them need less than their median.
+    # The further variance that makes each offset a usual one; half of them need less than their median.
     needed = ((offset / USUAL) ** 2 - explained) / measured.alike
     return float(np.sqrt(max(np.median(needed), 0.0)))

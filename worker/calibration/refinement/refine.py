@@ -1,4 +1,4 @@
-"""The finish: all cameras at once onto the measured lines, by a robust Gauss-Newton, and how sure that is.
+"""Refinement: all cameras at once onto the measured lines, by a robust Gauss-Newton, with uncertainties.
 
 Found with the poses: how the ground swells, and whatever number of lens or field is left free.
 """
@@ -31,35 +31,17 @@ from worker.calibration.refinement.unknowns import Unknowns
 from worker.calibration.robust import huber_weights, tukey_weights
 
 SEARCH_PX = (14.0, 8.0, 5.0)
-"""How far from where the pose expects it a line is looked for, round by round, in pixels of a 4K frame."""
-LAST_SEARCH_PX = 5.0
-"""In the last rounds, which go on until the cameras stand still. Wide enough that it is the robust weights which leave
-out a line point, and not the end of the search, which moves with the cameras."""
-SPARE_PX = 4.0
-"""So much farther than it is asked to look a reading of a frame reaches, so that it is good for more than one pose, and
-that of the last round for the evaluation of where it led."""
+"""Half width of the search for lines round by round, in pixels of a 4K frame."""
 EVALUATION_SEARCH_PX = 8.0
 MOST_STEPS = 4
-"""Of a coarse round."""
-MOST_READINGS, MOST_LAST_STEPS = 6, 12
-"""How often the frames are read again in the last rounds, and how many steps each reading is good for."""
-MISFIT_FLATTENS_PX = 0.3
-"""Error that nothing explains at which the ground is taken for half as uneven as its heights say."""
-SETTLED_M = 2e-4
-"""Cameras that a step moves less than this are where these measurements lead."""
-ARRIVED_M, NEARER, PATIENCE = 5e-5, 0.1, 3
-"""The last steps end when cameras move less than this, or than such a part of the first step on the same reading, or
-when so many steps were no shorter than one before: a line point that fits two shifts alike may go to and fro."""
-READ_ALIKE_M, LEAST_NEARER = 1e-4, 0.2
-"""Cameras that the next reading of the frames would move less than this have arrived. Each moves them by about the same
-part of what the one before did, and by no less than this part of it."""
+"""Most steps of a coarse round."""
 NOT_LOOKED_AT: NDArray[np.float32] = np.zeros((1, 1), dtype=np.float32)
-"""The response of a network that has not looked at a frame: it sees a marking nowhere."""
+"""Response to a frame that the network was not run on: a marking nowhere."""
 
 
 @dataclass(frozen=True)
 class Observations:
-    """What a finish looks at: per camera the `channels` of its frame and `responses` (H, W), the segmentation 0..1."""
+    """Observations of the cameras: the `channels` of each frame and its `responses` (H, W), the segmentation 0..1."""
 
     channels: Sequence[Channels]
     responses: Sequence[NDArray[np.float32]]
@@ -70,41 +52,43 @@ class Observations:
         return cls(channels, [NOT_LOOKED_AT] * len(channels))
 
     def of(self, numbers: Sequence[int]) -> Observations:
-        """That of some of the cameras."""
+        """Return the observations of some of the cameras."""
         return Observations([self.channels[n] for n in numbers], [self.responses[n] for n in numbers])
 
     def reader(self) -> LineReader:
-        """What measures the lines in it."""
+        """Return a reader of the lines in them."""
         return LineReader(self)
 
 
 class LineReader:
-    """Measures the lines of several cameras around any poses; reads a frame again only where it has to."""
+    """Reader of the lines of several cameras around any poses; it reads a frame again only where it has to."""
 
     def __init__(self, observations: Observations, read: Mapping[int, LineProfiles] = MappingProxyType({})) -> None:
         self._observations = observations
         self._read = dict(read)
 
     def of(self, numbers: Sequence[int]) -> LineReader:
-        """A reader for some of the cameras, with what has been read of them."""
+        """Return a reader for some of the cameras, with what has been read of them."""
         read = {at: self._read[n] for at, n in enumerate(numbers) if n in self._read}
         return LineReader(self._observations.of(numbers), read)
 
     def measure(self, lines: LinePoints, cameras: Sequence[Camera], search_px: float) -> list[Measurements]:
-        """The lines of each camera within `search_px` (of a 4K frame) of where its pose expects them."""
+        """Measure the lines of each camera within `search_px` (of a 4K frame) of where its pose expects them."""
         measured = []
         for number, camera in enumerate(cameras):
             search = search_px * camera.intrinsics.relative_size
             profiles = self._read.get(number)
             if profiles is None or not profiles.cover(camera, lines, search):
                 channels, response = self._observations.channels[number], self._observations.responses[number]
-                profiles = LineProfiles.read(lines, camera, channels, response, search + SPARE_PX)
+                # Length by which a reading of a frame reaches beyond the search, so that it is good for more than one
+                # pose, and that of the last round for the evaluation of where it led.
+                profiles = LineProfiles.read(lines, camera, channels, response, search + 4.0)
                 self._read[number] = profiles
             measured.append(profiles.measure(camera, lines, search))
         return measured
 
     def evidence(self, pitch: Field, lines: LinePoints, cameras: Sequence[Camera]) -> list[Evidence]:
-        """How much of the lines the frames show where the cameras put them."""
+        """Return the evidence for the lines where the cameras put them."""
         return [
             evidence_of(lines, camera, channels, response, left_out(pitch, camera))
             for camera, channels, response in zip(
@@ -138,137 +122,152 @@ def refine(
     if stitch_weight == 0 and len(cameras) > 1 and not free:
         return _each_alone(pitch, cameras, observations, stored or cameras, memories)
     unknowns = Unknowns(len(cameras), free, Ground.under(pitch.line_points()))
-    begun = Estimate.at(pitch, cameras, unknowns)
+    begun = Estimate.initial(pitch, cameras, unknowns)
     remembered = memories_of_field(memories or [None] * len(cameras), begun.lines)
-    finish = _Finish(reader or observations.reader(), unknowns, _aside(remembered), cameras)
-    caught = finish.catch(begun, searches_px)
-    anew = _painted_anew(caught, remembered, finish)
-    if len(anew) != len(finish.anew):
+    refiner = _Refiner(reader or observations.reader(), unknowns, _repainted_in_memory(remembered), cameras)
+    caught = refiner.catch(begun, searches_px)
+    repainted = _find_repainted(caught, remembered, refiner)
+    if len(repainted) != len(refiner.repainted):
         # They have pulled the cameras away from all other markings.
-        finish = replace(finish, anew=anew)
-        caught = finish.catch(begun, searches_px)
-    last = finish.settle(caught)
+        refiner = replace(refiner, repainted=repainted)
+        caught = refiner.catch(begun, searches_px)
+    last = refiner.settle(caught)
     uneven = last.unevenness(unknowns, unknowns.ground.ordinary)
-    here = replace(last.to, uneven_m=uneven)
+    estimate = replace(last.to, uneven_m=uneven)
     # Judged by a wider search than the last round's, which could not see an error larger than itself.
-    return _with_moves(_assessed(here, stored or cameras, remembered, finish), here, finish)
+    return _with_pose_shift_if_corrected(_assessed(estimate, stored or cameras, remembered, refiner), estimate, refiner)
 
 
 @dataclass(frozen=True)
-class _Finish:
-    """What moves cameras from where they were `found` onto the lines that a `reader` measures.
+class _Refiner:
+    """Gauss-Newton refinement of cameras `found` near the lines that a `reader` measures.
 
-    `anew`: the numbers of the markings that are painted elsewhere and say nothing of any pose.
+    `repainted`: the numbers of the markings that are painted elsewhere and say nothing of any pose.
     """
 
     reader: LineReader
     unknowns: Unknowns
-    anew: NDArray[np.intp]
+    repainted: NDArray[np.intp]
     found: Sequence[Camera]
 
-    def measure(self, here: Estimate, search_px: float) -> list[Measurements]:
-        """The lines within `search_px` (of a 4K frame) of where the cameras expect them, on their ground."""
-        return self.but_anew(self.reader.measure(here.on_ground(self.unknowns), here.cameras, search_px))
+    def measure(self, estimate: Estimate, search_px: float) -> list[Measurements]:
+        """Measure the lines within `search_px` (of a 4K frame) of where the cameras expect them, on their ground."""
+        return self.without_repainted(
+            self.reader.measure(estimate.on_ground(self.unknowns), estimate.cameras, search_px)
+        )
 
-    def but_anew(self, measured: Sequence[Measurements]) -> list[Measurements]:
-        """The measurements of all markings that are where they were."""
-        if len(self.anew) == 0:
+    def without_repainted(self, measured: Sequence[Measurements]) -> list[Measurements]:
+        """Return the measurements without those of repainted markings."""
+        if len(self.repainted) == 0:
             return list(measured)
-        return [found[~np.isin(found.points.marking, self.anew)] for found in measured]
+        return [found[~np.isin(found.points.marking, self.repainted)] for found in measured]
 
-    def around(self, here: Estimate) -> _Finish:
-        """Return the finish for the pitch of an estimate, which steps may have changed."""
-        return replace(self, unknowns=self.unknowns.around(here.pitch, here.lines))
+    def around(self, estimate: Estimate) -> _Refiner:
+        """Return the refinement for the field of an estimate, which steps may have changed."""
+        return replace(self, unknowns=self.unknowns.around(estimate.pitch, estimate.lines))
 
-    def catch(self, here: Estimate, searches_px: Sequence[float]) -> Estimate:
-        """Where the cameras are when they have caught the lines, round by round with a narrower search."""
+    def catch(self, estimate: Estimate, searches_px: Sequence[float]) -> Estimate:
+        """Return the estimate after rounds with a narrower and narrower search, which catch the lines."""
         for search in searches_px:
-            this = self.around(here)
-            measured = this.measure(here, search)
+            this = self.around(estimate)
+            measured = this.measure(estimate, search)
             # Huber's loss has one minimum, wherever one begins; Tukey's, which outliers do not move, has several. One
             # step towards the nearest of those drops the outliers and still ends in one place (Bickel, 1975).
-            here = this.down_huber(here, measured)
-            here = this.towards_tukey(here, measured).to
-        return here
+            estimate = this.down_huber(estimate, measured)
+            estimate = this.towards_tukey(estimate, measured).to
+        return estimate
 
-    def settle(self, here: Estimate) -> GaussNewtonStep:
-        """The step that leads to where the cameras stand still.
+    def settle(self, estimate: Estimate) -> GaussNewtonStep:
+        """Return the step that leads to where the cameras stand still.
 
         What is read of a frame depends a little on where its pixels lie beside the lines. So the frames are read anew
         at the poses that the last reading led to, until that moves nothing: the end does not depend on the beginning.
         """
         moves = list[float]()
         self.reader.read_anew()
-        for _ in range(MOST_READINGS):
-            last = replace(self.around(here), found=here.cameras).follow(here)
-            moves.append(last.to.largest_move_m(here))
-            here = last.to
+        for _ in range(6):
+            last = replace(self.around(estimate), found=estimate.cameras).follow(estimate)
+            moves.append(last.to.largest_move_m(estimate))
+            estimate = last.to
             nearer = moves[-1] / moves[-2] if len(moves) > 1 else 1.0
-            if moves[-1] * max(nearer, LEAST_NEARER) < READ_ALIKE_M:
+            # Each reading moves the cameras by about the same part of what the one before did, and by no less than a
+            # fifth of it: they have arrived where the next one would move them less than 0.1 mm.
+            if moves[-1] * max(nearer, 0.2) < 1e-4:
                 break
             self.reader.read_anew()
         return last
 
-    def follow(self, here: Estimate) -> GaussNewtonStep:
-        """The last of the steps to where the lines are as the frames have been read."""
+    def follow(self, estimate: Estimate) -> GaussNewtonStep:
+        """Return the last of the steps to the lines as the frames have been read."""
         mixed, lengths = MixedSteps(self.unknowns), list[float]()
-        for _ in range(MOST_LAST_STEPS):
-            last = self.towards_tukey(here, self.measure(here, LAST_SEARCH_PX))
-            lengths.append(last.to.largest_move_m(here))
-            if lengths[-1] < max(ARRIVED_M, NEARER * lengths[0]) or min(lengths[-PATIENCE:]) > min(
-                lengths[:-PATIENCE], default=np.inf
+        patience = 3
+        for _ in range(12):
+            # Half width of the search in the last rounds, which go on until the cameras stand still. Wide enough that
+            # it is the robust weights which leave out a line point, and not the end of the search, which moves with the
+            # cameras.
+            last = self.towards_tukey(estimate, self.measure(estimate, 5.0))
+            lengths.append(last.to.largest_move_m(estimate))
+            # They end when cameras move less than this, or than such a part of the first step on the same reading, or
+            # when so many steps were no shorter than one before: a line point that fits two shifts alike may go to and
+            # fro.
+            if lengths[-1] < max(5e-5, 0.1 * lengths[0]) or min(lengths[-patience:]) > min(
+                lengths[:-patience], default=np.inf
             ):
                 break
-            here = mixed.step(here, last)
+            estimate = mixed.step(estimate, last)
         return last
 
-    def down_huber(self, here: Estimate, measured: Sequence[Measurements]) -> Estimate:
-        """Where Huber's loss of the same measurements is least."""
+    def down_huber(self, estimate: Estimate, measured: Sequence[Measurements]) -> Estimate:
+        """Minimise Huber's loss of the same measurements."""
         for _ in range(MOST_STEPS):
-            before = here
-            here = gauss_newton_step(here, self.found, doubted(here, measured), self.unknowns, huber_weights).to
-            if here.largest_move_m(before) < SETTLED_M:
+            before = estimate
+            estimate = gauss_newton_step(
+                estimate, self.found, with_misfit_noise(estimate, measured), self.unknowns, huber_weights
+            ).to
+            if estimate.largest_move_m(before) < 2e-4:
                 break
-        return here
+        return estimate
 
-    def towards_tukey(self, here: Estimate, measured: Sequence[Measurements]) -> GaussNewtonStep:
-        """One step towards the least of Tukey's loss, and how uneven the ground is there."""
-        measured = doubted(here, measured)
-        made = gauss_newton_step(here, self.found, measured, self.unknowns, tukey_weights)
+    def towards_tukey(self, estimate: Estimate, measured: Sequence[Measurements]) -> GaussNewtonStep:
+        """Take one step towards the minimum of Tukey's loss, and estimate the ground's unevenness there."""
+        measured = with_misfit_noise(estimate, measured)
+        made = gauss_newton_step(estimate, self.found, measured, self.unknowns, tukey_weights)
         uneven = made.unevenness(self.unknowns, self.unknowns.ground.even)
         # A lens or a field that is wrong bends lines as a swelling ground does: the more of it, the flatter the ground.
-        uneven /= 1 + (max(found.misfit_px for found in measured) / MISFIT_FLATTENS_PX) ** 2
+        uneven /= 1 + (max(found.misfit_px for found in measured) / 0.3) ** 2
         return replace(made, to=replace(made.to, uneven_m=min(uneven, self.unknowns.ground.most_m)))
 
 
-def _aside(remembered: Sequence[CameraMemory | None]) -> NDArray[np.intp]:
-    """The markings that the memory of any camera says are painted elsewhere."""
+def _repainted_in_memory(remembered: Sequence[CameraMemory | None]) -> NDArray[np.intp]:
+    """Return the markings that the memory of any camera says are painted elsewhere."""
     known = [memory.repainted_markings for memory in remembered if memory is not None]
     return np.unique(np.concatenate([np.empty(0), *known])).astype(np.intp)
 
 
-def _painted_anew(here: Estimate, remembered: Sequence[CameraMemory | None], finish: _Finish) -> NDArray[np.intp]:
-    """The markings that lie elsewhere than the memory of any camera has them: they are the same paint for all."""
+def _find_repainted(
+    estimate: Estimate, remembered: Sequence[CameraMemory | None], refiner: _Refiner
+) -> NDArray[np.intp]:
+    """Return the markings that lie elsewhere than the memory of any camera has them: all see the same paint."""
     if not any(remembered):
-        return finish.anew
-    measured = finish.reader.measure(here.on_ground(finish.unknowns), here.cameras, SEARCH_PX[0])
-    told = [
-        find_repainted_markings(memory, found, here.lines)
+        return refiner.repainted
+    measured = refiner.reader.measure(estimate.on_ground(refiner.unknowns), estimate.cameras, SEARCH_PX[0])
+    found = [
+        find_repainted_markings(memory, found, estimate.lines)
         for memory, found in zip(remembered, measured, strict=True)
         if memory is not None
     ]
-    return np.unique(np.concatenate([finish.anew, *told]))
+    return np.unique(np.concatenate([refiner.repainted, *found]))
 
 
-def doubted(here: Estimate, measured: Sequence[Measurements]) -> list[Measurements]:
-    """The measurements with the error that neither noise nor paint nor ground explains where the finish stands.
+def with_misfit_noise(estimate: Estimate, measured: Sequence[Measurements]) -> list[Measurements]:
+    """Return the measurements with their misfit: the error that neither noise nor paint nor ground explains.
 
     Lens and field are never quite what they are said to be, by pixels alike near and far. Without it, a far line that a
-    wrong lens puts beside itself by ten of its small sigmas would outweigh all near ones.
+    wrong lens displaces by ten of its small sigmas would outweigh all near ones.
     """
     return [
-        replace(found, misfit_px=misfit_px(found.offset(camera, here.lines.position[found.index]), found))
-        for camera, found in zip(here.cameras, measured, strict=True)
+        replace(found, misfit_px=misfit_px(found.offset(camera, estimate.lines.position[found.index]), found))
+        for camera, found in zip(estimate.cameras, measured, strict=True)
     ]
 
 
@@ -280,13 +279,13 @@ def evaluate_poses(
     stored: Sequence[Camera] | None = None,
     memories: Sequence[CameraMemory | None] | None = None,
 ) -> RefinedPoses:
-    """What the lines say of poses that are left as they are, with everything else; arguments as for `refine`."""
+    """Evaluate poses that are left as they are, with everything else; arguments as for `refine`."""
     unknowns = Unknowns(len(cameras), free, Ground.under(pitch.line_points()))
-    here = Estimate.at(pitch, cameras, unknowns)
-    remembered = memories_of_field(memories or [None] * len(cameras), here.lines)
-    finish = _Finish(observations.reader(), unknowns, _aside(remembered), cameras)
-    finish = replace(finish, anew=_painted_anew(here, remembered, finish))
-    return _assessed(here, stored or cameras, remembered, finish)
+    estimate = Estimate.initial(pitch, cameras, unknowns)
+    remembered = memories_of_field(memories or [None] * len(cameras), estimate.lines)
+    refiner = _Refiner(observations.reader(), unknowns, _repainted_in_memory(remembered), cameras)
+    refiner = replace(refiner, repainted=_find_repainted(estimate, remembered, refiner))
+    return _assessed(estimate, stored or cameras, remembered, refiner)
 
 
 def _each_alone(
@@ -296,7 +295,7 @@ def _each_alone(
     stored: Sequence[Camera],
     memories: Sequence[CameraMemory | None] | None,
 ) -> RefinedPoses:
-    """Cameras that need not agree, each on a ground of its own."""
+    """Refine cameras that need not agree, each on a ground of its own."""
     ends = [
         refine(pitch, [camera], observations.of([n]), 0.0, stored=[stored[n]], memories=memories and [memories[n]])
         for n, camera in enumerate(cameras)
@@ -306,53 +305,53 @@ def _each_alone(
 
 
 def _assessed(
-    here: Estimate, stored: Sequence[Camera], remembered: Sequence[CameraMemory | None], finish: _Finish
+    estimate: Estimate, stored: Sequence[Camera], remembered: Sequence[CameraMemory | None], refiner: _Refiner
 ) -> RefinedPoses:
-    finish = finish.around(here)
-    lines, reader = here.on_ground(finish.unknowns), finish.reader
-    evidence = reader.evidence(here.pitch, lines, here.cameras)
-    everything = _of_seen(reader.measure(lines, here.cameras, EVALUATION_SEARCH_PX), evidence)
-    measured = doubted(here, finish.but_anew(everything))
+    refiner = refiner.around(estimate)
+    lines, reader = estimate.on_ground(refiner.unknowns), refiner.reader
+    evidence = reader.evidence(estimate.pitch, lines, estimate.cameras)
+    everything = _of_seen(reader.measure(lines, estimate.cameras, EVALUATION_SEARCH_PX), evidence)
+    measured = with_misfit_noise(estimate, refiner.without_repainted(everything))
     # A field that is wrong looks like a ground that swells a lot: judged, it has to be an ordinary ground.
-    ordinary = replace(here, uneven_m=min(here.uneven_m, finish.unknowns.ground.usual_m))
-    finished = estimate_uncertainty(ordinary, stored, remembered, measured, evidence, finish.unknowns)
+    ordinary = replace(estimate, uneven_m=min(estimate.uneven_m, refiner.unknowns.ground.usual_m))
+    refined = estimate_uncertainty(ordinary, stored, remembered, measured, evidence, refiner.unknowns)
     each = [
-        replace(one, measured=its, repainted_markings=tuple(finish.anew.tolist()))
-        for one, its in zip(finished.each, doubted(here, everything), strict=True)
+        replace(one, measured=its, repainted_markings=tuple(refiner.repainted.tolist()))
+        for one, its in zip(refined.each, with_misfit_noise(estimate, everything), strict=True)
     ]
-    return replace(finished, each=each)
+    return replace(refined, each=each)
 
 
-def _with_moves(finished: RefinedPoses, here: Estimate, finish: _Finish) -> RefinedPoses:
-    """The same, and of each number of the field that the lines contradict how far it moves the cameras, put right."""
-    measured = finish.but_anew([one.measured for one in finished.each if one.measured is not None])
+def _with_pose_shift_if_corrected(refined: RefinedPoses, estimate: Estimate, refiner: _Refiner) -> RefinedPoses:
+    """Return the poses, with the move of the cameras for each parameter of the field that the lines contradict."""
+    measured = refiner.without_repainted([one.measured for one in refined.each if one.measured is not None])
     deviations = [
-        replace(one, moves_m=_moves_m(one, here, measured, finish)) if one.camera is None and is_sure(one) else one
-        for one in finished.deviations
+        replace(one, moves_m=_moves_m(one, estimate, measured, refiner)) if one.camera is None and is_sure(one) else one
+        for one in refined.deviations
     ]
-    return replace(finished, deviations=deviations)
+    return replace(refined, deviations=deviations)
 
 
-def _moves_m(wrong: Deviation, here: Estimate, measured: Sequence[Measurements], finish: _Finish) -> dict[str, float]:
+def _moves_m(
+    wrong: Deviation, estimate: Estimate, measured: Sequence[Measurements], refiner: _Refiner
+) -> dict[str, float]:
     """Return the move (m) of each camera, by id, on the same measurements with a measure of the field corrected.
 
     Nothing for a number that no field can have otherwise.
     """
-    measure = next((one for one in field_measures(here.pitch) if one.name == wrong.name), None)
+    measure = next((one for one in field_measures(estimate.pitch) if one.name == wrong.name), None)
     if measure is None:
         return {}
-    _, pitch = measure.applied(here.cameras, here.pitch, wrong.value)
-    there = replace(here, pitch=pitch, lines=pitch.same_line_points(here.lines))
-    finish = finish.around(there)
-    there = finish.down_huber(there, measured)
+    _, pitch = measure.applied(estimate.cameras, estimate.pitch, wrong.value)
+    there = replace(estimate, pitch=pitch, lines=pitch.same_line_points(estimate.lines))
+    refiner = refiner.around(there)
+    there = refiner.down_huber(there, measured)
     for _ in range(MOST_STEPS):
-        there = finish.towards_tukey(there, measured).to
-    return {
-        before.id: float(np.linalg.norm(after.pose.position - before.pose.position))
-        for before, after in zip(here.cameras, there.cameras, strict=True)
-    }
+        there = refiner.towards_tukey(there, measured).to
+    moved = zip(estimate.cameras, there.cameras, strict=True)
+    return {before.id: before.distance_m(after) for before, after in moved}
 
 
 def _of_seen(measured: Sequence[Measurements], evidence: Sequence[Evidence]) -> list[Measurements]:
-    """The measurements of markings that are seen: ridges found where a line should be and is not fix no pose."""
+    """Return the measurements of markings that are seen: ridges found where a line should be and is not fix no pose."""
     return [found[np.isin(found.points.marking, seen.seen())] for found, seen in zip(measured, evidence, strict=True)]

@@ -1,4 +1,4 @@
-"""What the least squares of the finish asks for, and in which order."""
+"""Unknowns of the refinement's least squares, and their order."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from worker.calibration.geometry.parameters import FieldParameter, LensParameter
 
 @dataclass(frozen=True)
 class Unknowns:
-    """The poses of V views, E numbers of lenses and field, and K heights of the ground, in this order: U in all.
+    """Poses of V views, E parameters of lenses and field, K heights of the ground, in this order: U unknowns.
 
     A view is a camera at one time: tonight, or in a memory of earlier nights. `lenses[v]`: the `camera` numbers of the
     `LensParameter`s that the lens of view v has; by default its own number alone.
@@ -26,15 +26,15 @@ class Unknowns:
 
     @property
     def dense(self) -> int:
-        """6 V + E: the poses and numbers, each of which touches many lines. A height touches those around its node."""
+        """Number 6 V + E of poses and parameters, which touch many lines, as a height does not."""
         return POSE_NUMBERS * self.views + len(self.parameters)
 
     def pose(self, view: int) -> slice:
-        """Where the pose of a view stands among the unknowns."""
+        """Return the slice of the unknowns that is the pose of a view."""
         return slice(POSE_NUMBERS * view, POSE_NUMBERS * (view + 1))
 
     def parameters_of(self, view: int) -> list[tuple[int, Parameter]]:
-        """The numbers that move lines in a view, each with where it stands among the unknowns."""
+        """Return the parameters that move lines in a view, each with its index among the unknowns."""
         lenses = self.lenses[view] if self.lenses else (view,)
         first = POSE_NUMBERS * self.views
         return [
@@ -44,7 +44,7 @@ class Unknowns:
         ]
 
     def around(self, pitch: Field, lines: LinePoints) -> Unknowns:
-        """The same unknowns on a pitch that has been changed since."""
+        """Return the unknowns for a field that has been changed since."""
         parameters = [p.around(pitch, lines) if isinstance(p, FieldParameter) else p for p in self.parameters]
         return replace(self, parameters=parameters)
 

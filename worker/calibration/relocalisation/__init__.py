@@ -1,1 +1,2 @@
-"""A camera found from nothing: pose, and focal length where it is unknown, from one frame and the field's markings."""
+"""Relocalisation: pose, and focal length where it is unknown, from one frame and the field's markings, without a
+start."""

@@ -1,4 +1,4 @@
-"""How well hypotheses agree with a view, both ways: is the expected seen, and is the seen expected?"""
+"""Agreement of hypotheses with a view, both ways: expected lines that are seen, and seen lines that are expected."""
 
 from __future__ import annotations
 
@@ -10,30 +10,22 @@ from worker.calibration.relocalisation.field_map import FieldMap
 from worker.calibration.relocalisation.hypotheses import Hypotheses
 from worker.calibration.relocalisation.line_view import WIDTH_PX, LineView
 
-AT_ONCE = 1024
 NEAREST_M = 0.3
 HALF_WIDTH_PX = WIDTH_PX / 2
-LONGEST_STEP_PX = 25.0
-"""Two points of a marking that are farther apart in the view count as so far, view pixels."""
-UNSEEN_PX = 40.0
-"""Of line that is taken for missing from every view, so that little in view is not all in view."""
-FEWEST_POINTS = 30
-"""Points of markings that have to be in view for an agreement to count in full."""
-ROLLED = 0.01
-"""What a roll of one standard deviation takes from an agreement."""
 LOWEST_M = 1.2
-"""Lower no camera is sought: from the ground everything can be explained by a few lines."""
+"""Least height of a sought camera: from the ground everything can be explained by a few lines."""
 
 
 def agreement(field: FieldMap, view: LineView, cameras: Hypotheses, tolerance_px: float) -> Array:
-    """Return for each hypothesis (P,) how much of the lines is found both ways, 0..1, less what its roll costs.
+    """Return the agreement (P,), 0..1, of each hypothesis with the lines of a view, less the cost of its roll.
 
     Dice's coefficient in view pixels: line that is expected and painted, and paint that is expected, out of both; a
     distance of `tolerance_px` counts for 1/e.
     """
+    at_once = 1024
     parts = [
-        _agreement(field, view, cameras[start : start + AT_ONCE], tolerance_px)
-        for start in range(0, len(cameras), AT_ONCE)
+        _agreement(field, view, cameras[start : start + at_once], tolerance_px)
+        for start in range(0, len(cameras), at_once)
     ]
     return np.concatenate(parts) if parts else np.zeros(0)
 
@@ -41,15 +33,18 @@ def agreement(field: FieldMap, view: LineView, cameras: Hypotheses, tolerance_px
 def _agreement(field: FieldMap, view: LineView, cameras: Hypotheses, tolerance: float) -> Array:
     expected, found, points = _expected_and_found(field, view, cameras, tolerance)
     explained = _explained(field, view, cameras, tolerance) * view.painted_px
-    dice = (found + explained) / (expected + view.painted_px + UNSEEN_PX) * np.minimum(1.0, points / FEWEST_POINTS)
-    rolled = ROLLED * (cameras.rotations[:, 0, 2] / np.sin(view.roll_sigma)) ** 2
+    # Length of line that is taken for missing from every view, so that little in view is not all in view.
+    # Fewest points of markings in view for an agreement to count in full.
+    dice = (found + explained) / (expected + view.painted_px + 40.0) * np.minimum(1.0, points / 30)
+    # Agreement that a roll of one standard deviation costs.
+    rolled = 0.01 * (cameras.rotations[:, 0, 2] / np.sin(view.roll_sigma)) ** 2
     return np.where(cameras.positions[:, 2] > LOWEST_M, dice - rolled, 0.0)
 
 
 def _expected_and_found(
     field: FieldMap, view: LineView, cameras: Hypotheses, tolerance: float
 ) -> tuple[Array, Array, Array]:
-    """For each hypothesis the length of line in view, how much of it is painted (view pixels), and how many points."""
+    """Return, per hypothesis, length of line in view, painted length (view pixels), number of points."""
     rotations = cameras.rotations.astype(np.float32)
     focal = cameras.focal_px.astype(np.float32)[:, None]
     moved = rotations @ field.points.T - (rotations @ cameras.positions[..., None].astype(np.float32))
@@ -59,7 +54,7 @@ def _expected_and_found(
     x, y = focal * moved[:, 0] / depth, focal * moved[:, 1] / depth
     if cameras.bends.any():
         bent = cameras.bends.astype(np.float32)[:, None] * (x * x + y * y) / HALF_WIDTH_PX**2
-        # Where a lens would bend the picture back nothing is seen.
+        # Nothing is seen where a lens would bend the picture back.
         ahead &= 3 * bent > -1
         x, y = x * (1 + bent), y * (1 + bent)
     height, width = view.distance.shape
@@ -69,13 +64,14 @@ def _expected_and_found(
     row, column = np.where(seen, row, 0), np.where(seen, column, 0)
     counted = seen & view.covered[row, column] & field.joined
     steps = np.hypot(np.diff(x, axis=1, append=x[:, -1:]), np.diff(y, axis=1, append=y[:, -1:]))
-    lengths = np.minimum(steps, LONGEST_STEP_PX) * counted
+    # Longest counted distance between two points of a marking in the view, view pixels.
+    lengths = np.minimum(steps, 25.0) * counted
     near = np.exp(-((view.distance[row, column] / tolerance) ** 2))
     return lengths.sum(axis=1), (lengths * near).sum(axis=1), counted.sum(axis=1)
 
 
 def _explained(field: FieldMap, view: LineView, cameras: Hypotheses, tolerance: float) -> Array:
-    """For each hypothesis the share of the places on paint that lie on a marking, 0..1."""
+    """Return, for each hypothesis, the share of the places on paint that lie on a marking, 0..1."""
     rotations = cameras.rotations.astype(np.float32)
     positions = cameras.positions.astype(np.float32)
     focal = cameras.focal_px.astype(np.float32)[:, None]
@@ -96,7 +92,7 @@ def _explained(field: FieldMap, view: LineView, cameras: Hypotheses, tolerance: 
 
 
 def straightened(places: NDArray[np.float32], bends: Array) -> NDArray[np.float32]:
-    """Places (M, 2) of the view without each of the bends (P,): (P, M, 2), by a Newton step from a first guess."""
+    """Return places (M, 2) of the view with each of the bends (P,) undone, (P, M, 2), by a Newton step."""
     if not bends.any():
         return places[None]
     # A place that was `scale` times as far from the centre has scale (1 + bent scale²) = 1.

@@ -1,4 +1,5 @@
-"""Hypotheses moved onto the paint that is seen: Gauss-Newton steps of an iterated closest point, for all at once.
+"""Alignment of hypotheses with the paint that is seen: Gauss-Newton steps of an iterated closest point, for all at
+once.
 
 Each point of a marking is drawn to the nearest paint, across its own line alone: along it nothing is measured. What the
 lines leave open stays as it was, by how far a hypothesis may be off.
@@ -16,19 +17,12 @@ from worker.calibration.relocalisation.field_map import FieldMap
 from worker.calibration.relocalisation.hypotheses import FARTHEST_BENT, Hypotheses, LensSteps
 from worker.calibration.relocalisation.line_view import LineView
 
-STEPS = 3
-TURN_RAD, SHIFT = 0.05, 0.06
-"""How far off a hypothesis may be (one standard deviation): turned, and moved by a part of how far it is from what it
-sees."""
-NOISE_PX = 2.0
-"""Standard deviation of where one point of paint is measured across its line, view pixels: neighbours share errors."""
-
 
 def aligned(
     field: FieldMap, view: LineView, cameras: Hypotheses, scores: Array, tolerance_px: float, lens: LensSteps
 ) -> tuple[Hypotheses, Array]:
     """Return each hypothesis (P,) moved onto the paint as long as its agreement grows, and the agreements."""
-    for _ in range(STEPS):
+    for _ in range(3):
         moved = _stepped(field, view, cameras, tolerance_px, lens)
         of_moved = agreement(field, view, moved, tolerance_px)
         better = of_moved > scores
@@ -41,7 +35,7 @@ def aligned(
 
 
 def _stepped(field: FieldMap, view: LineView, cameras: Hypotheses, tolerance_px: float, lens: LensSteps) -> Hypotheses:
-    """Each hypothesis after one step: of rotation (3), place in its own axes (3), log focal length and bend."""
+    """Return each hypothesis after one step: of rotation (3), place in its own axes (3), log focal length and bend."""
     focal = cameras.focal_px[:, None]
     ahead_of = np.einsum("pij,pnj->pni", cameras.rotations, field.points[None] - cameras.positions[:, None])
     ahead = ahead_of[..., 2] > NEAREST_M
@@ -56,22 +50,24 @@ def _stepped(field: FieldMap, view: LineView, cameras: Hypotheses, tolerance_px:
     counted = ahead & in_view & field.joined & (length > 1e-9)
     across = np.stack([-along[..., 1], along[..., 0]], axis=-1) / np.where(counted, length, 1.0)[..., None]
     off = (to_paint * across).sum(axis=-1)
-    weights = np.where(counted, np.exp(-((to_paint**2).sum(axis=-1) / tolerance_px**2)), 0.0) / NOISE_PX**2
+    # Standard deviation of a point of paint measured across its line, view pixels: neighbours share errors.
+    weights = np.where(counted, np.exp(-((to_paint**2).sum(axis=-1) / tolerance_px**2)), 0.0) / 2.0**2
 
     push = np.concatenate([focal[..., None] * across, -(seen * across).sum(axis=-1, keepdims=True)], axis=-1)
     push /= depth[..., None]
     radial = (seen * across).sum(axis=-1)
-    # What is known of a lens has no slope, and so stays exactly as it is.
+    # A known lens parameter has a Jacobian of 0, and so stays exactly as it is.
     of_lens = np.stack([radial * (lens.focal > 0), radial * outwards * (lens.bend > 0)], axis=-1)
-    slopes = np.concatenate([np.cross(ahead_of, push), push, of_lens], axis=-1)
+    jacobian = np.concatenate([np.cross(ahead_of, push), push, of_lens], axis=-1)
     reach = (depth * counted).sum(axis=1) / np.maximum(counted.sum(axis=1), 1)
-    # Where nothing is counted nothing is measured, and the step is none.
+    # Without counted points nothing is measured, and the step is none.
     reach = np.where(reach > 0, reach, 1.0)
     spread = np.empty((len(cameras), 8))
-    spread[:, :3], spread[:, 3:6] = TURN_RAD, SHIFT * reach[:, None]
+    # Standard deviation of a hypothesis: of its turn, and of its place as a part of the distance to what it sees.
+    spread[:, :3], spread[:, 3:6] = 0.05, 0.06 * reach[:, None]
     spread[:, 6:] = lens.focal or 1.0, lens.bend or 1.0
-    weighted = slopes * weights[..., None]
-    information = np.swapaxes(slopes, 1, 2) @ weighted + np.eye(8) / spread[:, None] ** 2
+    weighted = jacobian * weights[..., None]
+    information = np.swapaxes(jacobian, 1, 2) @ weighted + np.eye(8) / spread[:, None] ** 2
     step = np.linalg.solve(information, np.einsum("pnk,pn->pk", weighted, off)[..., None])[..., 0]
     return _moved(cameras, step)
 

@@ -1,4 +1,4 @@
-"""Cameras that may have taken a frame: proposed ones refined onto its measured lines, and what speaks for each."""
+"""Candidates for the camera of a frame: proposed ones refined onto its measured lines, with the evidence for each."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from worker.calibration.detection.evidence import Evidence
 from worker.calibration.diagnostics.overlap import Overlap, overlap_of
 from worker.calibration.diagnostics.registration import Response
 from worker.calibration.geometry.camera import Camera, inside
-from worker.calibration.geometry.derivatives import POSE_NUMBERS, pixel_slopes_of_all
+from worker.calibration.geometry.derivatives import POSE_NUMBERS, full_pixel_jacobian
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.lens import SIGMA_NAMES
 from worker.calibration.geometry.parameters import LensParameter, free_lens_sigma
@@ -21,25 +21,15 @@ from worker.calibration.refinement.uncertainty import RefinedPose, Sigma
 from worker.calibration.relocalisation.paint import Paint, share
 from worker.calibration.relocalisation.sought import SoughtCamera
 
-FAR_SEARCH_PX = (60.0, 28.0, 14.0, 8.0, 5.0)
-"""How far from a proposed line a painted one is looked for, round by round, in pixels of a 4K frame, where an ordinary
-finish sees some of the lines and not all. Most proposals are right to a pixel or two, and from there what lies farther
-off may be blotches of snow and worn grass; of others some lines are caught and one is taken for its neighbour."""
-HARDLY_SEEN, WELL_SEEN = 0.3, 0.9
-"""Shares of the expected lines, beyond chance. A pose that sees less than the first has none near that sees more, as a
-rule; a pose that sees more than the second is left as it is."""
-CLEARLY_MORE = 0.03
-"""By how much more a pose has to agree that may lie farther from its lines."""
-
 
 @dataclass(frozen=True)
 class Candidate:
-    """A camera that may have taken the frame, refined.
+    """Refined camera that may have taken the frame.
 
-    `agreement` 0..1: the harmonic mean of how much of the lines that it expects is seen beyond chance, as `evidence`
-    has it, and of how much of the paint in the frame is `explained`; `explains` (n,): which places on paint lie on such
-    a line; `residual_px`: rms of its lines, None where too few were measured, as `sigma` of the pose and `shift_px`,
-    how far off the markings in view may be for all that the lines leave open of pose and lens (rms, one sigma).
+    `agreement` 0..1: the harmonic mean of the share of expected lines seen beyond chance, as `evidence` has it, and of
+    the share of the frame's paint that is `explained`; `explains` (n,): True for places on paint that lie on such a
+    line; `residual_px`: rms of its lines, None where too few were measured, as `sigma` of the pose and `shift_px`, how
+    far off the markings in view may be for all that the lines leave open of pose and lens (rms, one sigma).
     """
 
     camera: Camera
@@ -53,7 +43,7 @@ class Candidate:
 
     @property
     def explained(self) -> float:
-        """The share of the paint in the frame, 0..1, that lies on a line of the field."""
+        """Share of the paint in the frame, 0..1, that lies on a line of the field."""
         return share(self.explains)
 
 
@@ -68,32 +58,37 @@ class FrameObservations:
 
     @classmethod
     def of(cls, field: Field, channels: Channels, response: Response) -> FrameObservations:
-        """Return what is observed in a frame by the response (H, W) of the network, 0..1."""
+        """Return the observations of a frame by the response (H, W) of the network, 0..1."""
         small = np.rint(response * 255).astype(np.uint8)
         return cls(field, Observations([channels], [response]), small, Paint.of(small))
 
     def strengthened(self, times: float) -> FrameObservations:
-        """Return what would be observed in this frame if the network were so many `times` as sure."""
+        """Return the observations of this frame for a network that is so many `times` as sure."""
         (channels,), (response,) = self.observations.channels, self.observations.responses
         return FrameObservations.of(self.field, channels, np.minimum(np.float32(times) * response, np.float32(1.0)))
 
     def candidate(self, camera: Camera, sought: SoughtCamera) -> Candidate:
-        """A proposed camera on the measured lines close by, with its lens if that is sought."""
+        """Refine a proposed camera onto the measured lines close by, with its lens if that is sought."""
         lens = free_lens(0, camera) if sought.is_lens_sought else []
         return self.assessed(refine(self.field, [camera], self.observations, 0.0, lens).each[0], sought)
 
     def on_lines_farther_off(self, camera: Camera, close: Candidate, sought: SoughtCamera) -> Candidate:
-        """A proposed camera on measured lines that lie farther off, if that is better than what it is `close` by."""
-        if not HARDLY_SEEN < close.evidence.agreement < WELL_SEEN:
+        """Refine a proposed camera onto lines farther off; return that if better than `close`."""
+        # A pose that sees less has none near that sees more, as a rule; one that sees more is left as it is.
+        if not 0.3 < close.evidence.agreement < 0.9:
             return close
         # Principal point and k2 would be bent for the sake of lines that are not caught yet.
         first = free_focal_length_and_k1(0, camera) if sought.is_lens_sought else []
-        caught = refine(self.field, [camera], self.observations, 0.0, first, FAR_SEARCH_PX).each[0]
+        # Half width of the search for lines of a proposal round by round, in pixels of a 4K frame, where an ordinary
+        # refinement sees some of the lines and not all. Most proposals are right to a pixel or two, and from there what
+        # lies farther off may be blotches of snow and worn grass; of others some lines are caught and one is taken for
+        # its neighbour.
+        caught = refine(self.field, [camera], self.observations, 0.0, first, (60.0, 28.0, 14.0, 8.0, 5.0)).each[0]
         far = self.candidate(caught.camera, sought) if sought.is_lens_sought else self.assessed(caught, sought)
         return far if is_better(far, close) else close
 
     def assessed(self, found: RefinedPose, sought: SoughtCamera) -> Candidate:
-        """A refined camera beside lines and paint of the frame, with what is known of a lens that was sought."""
+        """Assess a refined camera by lines and paint, and note the uncertainty of a lens that was sought."""
         if sought.is_lens_sought:
             found = replace(found, camera=_with_sigmas(found))
         explains = self.paint.on_markings(self.field, found.camera)
@@ -107,26 +102,27 @@ class FrameObservations:
 
 
 def is_better(one: Candidate, other: Candidate) -> bool:
-    """Whether one agrees clearly more with lines and paint than the other, or about as much with lines closer to it."""
+    """True if one agrees clearly more with lines and paint than the other, or about as much with lines closer to it."""
     more = one.agreement - other.agreement
-    if abs(more) > CLEARLY_MORE or one.residual_px is None or other.residual_px is None:
+    # Agreement by which a pose farther from its lines has to be better.
+    if abs(more) > 0.03 or one.residual_px is None or other.residual_px is None:
         return more > 0
     return one.residual_px < other.residual_px
 
 
 def free_lens(number: int, camera: Camera) -> list[LensParameter]:
-    """All numbers of the lens of a proposed camera, `number` of several, to be found along with its pose."""
+    """Return all parameters of the lens of a proposed camera, `number` of several, to be found along with its pose."""
     sigma = free_lens_sigma(camera.intrinsics)
     return [LensParameter(number, name, sigma[short]) for name, short in SIGMA_NAMES.items() if short in sigma]
 
 
 def free_focal_length_and_k1(number: int, camera: Camera) -> list[LensParameter]:
-    """Focal length and k1 of a proposed camera, to be found along with a pose that is not yet in place."""
+    """Return focal length and k1 of a proposed camera, to be found along with a pose that is not yet in place."""
     return [one for one in free_lens(number, camera) if one.name in ("focal_length_px", "k1")]
 
 
 def _with_sigmas(found: RefinedPose) -> Camera:
-    """The camera with what is known of its lens written beside it."""
+    """Return the camera with the uncertainty of its lens noted in it."""
     if found.refined is None:
         return found.camera
     deviations = np.sqrt(np.diag(found.refined.covariance)[POSE_NUMBERS:]).tolist()
@@ -136,11 +132,11 @@ def _with_sigmas(found: RefinedPose) -> Camera:
 
 
 def _shift_sigma_px(field: Field, found: RefinedPose) -> float | None:
-    """How far off the markings in view may be: rms of one standard deviation each; None where none were measured."""
+    """Return the rms standard deviation (px) of the markings in view; None where none were measured."""
     lines = field.line_points().position
     in_view = lines[inside(found.camera.project(lines), found.camera.intrinsics.size)]
     if found.refined is None or len(in_view) == 0:
         return None
-    slopes = pixel_slopes_of_all(found.camera, in_view)
-    variances = np.einsum("nij,jk,nik->n", slopes, found.refined.covariance, slopes)
+    jacobian = full_pixel_jacobian(found.camera, in_view)
+    variances = np.einsum("nij,jk,nik->n", jacobian, found.refined.covariance, jacobian)
     return float(np.sqrt(np.nanmean(variances)))

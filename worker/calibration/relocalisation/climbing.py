@@ -1,4 +1,4 @@
-"""An evolution strategy that climbs from many hypotheses to few: narrower tolerances, smaller steps, the best apart."""
+"""Evolution strategy from many hypotheses to few: narrower tolerances, smaller steps, the best ones apart."""
 
 from __future__ import annotations
 
@@ -17,13 +17,6 @@ from worker.calibration.relocalisation.hypotheses import FARTHEST_BENT, Hypothes
 from worker.calibration.relocalisation.line_view import LineView
 
 OFFSPRING = 12
-TURN_RAD = np.array([0.05, 0.05, 0.02])
-STEP = 0.06
-"""Of the distance to the ground that a camera looks at."""
-FARTHEST_M = 120.0
-COOLING = 0.9
-AIMING = 0.3
-"""Half of the offspring go on looking at the same ground, and turn by this part besides."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +50,7 @@ def climb(
     for level in levels:
         scores = agreement(field, view, cameras, level.tolerance_px)
         for generation in range(level.generations):
-            scale = level.scale * COOLING**generation
+            scale = level.scale * 0.9**generation
             offspring = _mutated(cameras, scale, steps, rng)
             of_offspring = agreement(field, view, offspring, level.tolerance_px).reshape(len(cameras), OFFSPRING)
             best = of_offspring.argmax(axis=1)
@@ -73,12 +66,12 @@ def climb(
 
 
 def _mutated(cameras: Hypotheses, scale: float, steps: LensSteps, rng: np.random.Generator) -> Hypotheses:
-    """`OFFSPRING` of each camera: a turn, a step, and changes of focal length and bend, drawn independently."""
+    """Return `OFFSPRING` of each camera: a turn, a step, and changes of focal length and bend, drawn independently."""
     count, half = len(cameras), OFFSPRING // 2
     forward = cameras.rotations[:, 2]
-    reach = np.minimum(np.maximum(cameras.positions[:, 2], 1) / np.maximum(-forward[:, 2], 0.05), FARTHEST_M)
-    turns = rng.normal(size=(count, OFFSPRING, 3)) * TURN_RAD * scale
-    places = cameras.positions[:, None] + rng.normal(size=(count, OFFSPRING, 3)) * (STEP * scale * reach)[:, None, None]
+    reach = np.minimum(np.maximum(cameras.positions[:, 2], 1) / np.maximum(-forward[:, 2], 0.05), 120.0)
+    turns = rng.normal(size=(count, OFFSPRING, 3)) * np.array([0.05, 0.05, 0.02]) * scale
+    places = cameras.positions[:, None] + rng.normal(size=(count, OFFSPRING, 3)) * (0.06 * scale * reach)[:, None, None]
     focal = np.repeat(cameras.focal_px[:, None], OFFSPRING, axis=1)
     if steps.focal > 0:
         focal = focal * np.exp(steps.focal * scale * rng.normal(size=focal.shape))
@@ -95,14 +88,14 @@ def _mutated(cameras: Hypotheses, scale: float, steps: LensSteps, rng: np.random
         bends[:, ::2] += steps.bend * scale * rng.normal(size=bends[:, ::2].shape)
         bends = np.clip(bends, -FARTHEST_BENT, FARTHEST_BENT)
     towards = np.einsum("nij,nkj->nki", cameras.rotations, np.cross(forward[:, None], aim))
-    turns[:, :half] *= AIMING
+    turns[:, :half] *= 0.3
     rotations[:, :half] = rotation_matrices(-towards) @ rotations[:, :half]
     rotations = rotation_matrices(turns) @ rotations
     return Hypotheses(rotations.reshape(-1, 3, 3), places.reshape(-1, 3), focal.reshape(-1), bends.reshape(-1))
 
 
 def _apart(cameras: Hypotheses, scores: Array, level: ClimbingRound) -> NDArray[np.intp]:
-    """The numbers of the best cameras no two of which are alike."""
+    """Return the numbers of the best cameras no two of which are alike."""
     kept = list[int]()
     for n in np.argsort(-scores):
         far = level.scale * (0.2 + 0.03 * float(np.linalg.norm(cameras.positions[n])))

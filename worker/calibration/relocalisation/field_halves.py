@@ -1,4 +1,4 @@
-"""From which side cameras look at a field that is the same from both: by what is said of them, or by each other."""
+"""Side from which cameras look at a symmetric field: by what is said of them, or by each other."""
 
 from __future__ import annotations
 
@@ -12,19 +12,10 @@ from worker.calibration.relocalisation.relocalise import twin
 from worker.calibration.relocalisation.shared_ground import GroundComparison, SharedGround
 from worker.calibration.relocalisation.sought import Place
 
-ON_ONE_MOUNT = 0.25
-"""A camera is taken for one on the mount of another when its twin is so much farther away: by one over this part."""
-SPEAKS_AGAINST = 0.1
-"""... unless from there the ground correlates by so much more with what another one sees: stands may be alike."""
-BEHIND_AN_END = 0.5
-"""A camera is told by left and right, not by near and far, whose y is less than this part of its x."""
-
 
 @dataclass(frozen=True)
 class ChosenSide:
-    """A camera on the side that it is taken to stand on; `remark`: why, in words; `decided`: whether that is known, or
-    both sides are as good.
-    """
+    """Camera on the side it is taken to stand on; `remark`: why; `decided`: True unless both sides are as good."""
 
     camera: Camera
     remark: str | None
@@ -34,7 +25,7 @@ class ChosenSide:
 def choose_sides(
     found: Sequence[Camera], places: Mapping[str, Place], known: Sequence[Camera], ground: SharedGround
 ) -> list[ChosenSide]:
-    """Choose of each camera found on a symmetric field itself or its twin.
+    """Choose between each camera found on a symmetric field and its twin.
 
     Cameras with a place are where they may be; the first of all, if no other is `known`, is taken to stand on the near
     side; each other one where the ground looks as one of those sees it. Where that is not clear it stands with one of
@@ -66,9 +57,10 @@ def choose_sides(
 
 
 def side_of(camera: Camera) -> str:
-    """The side of the field that a camera stands on, in a word."""
+    """Return the side of the field that a camera stands on, in a word."""
     x, y, _ = camera.pose.position
-    if abs(y) < BEHIND_AN_END * abs(x):
+    # Ratio of y to x of a camera below which it is told by left and right, not by near and far.
+    if abs(y) < 0.5 * abs(x):
         return "left" if x < 0 else "right"
     return "near" if y < 0 else "far"
 
@@ -85,7 +77,7 @@ def _on_the_near_side(camera: Camera) -> ChosenSide:
 
 
 def _on_shared_ground(camera: Camera, compared: GroundComparison) -> ChosenSide | None:
-    """On the side from which the ground looks as another camera sees it, if that is clear."""
+    """Return the side from which the ground looks as another camera sees it, None if that is not clear."""
     if compared.right is None:
         return None
     taken = (camera, twin(camera))[compared.right]
@@ -95,13 +87,14 @@ def _on_shared_ground(camera: Camera, compared: GroundComparison) -> ChosenSide 
 
 
 def _beside_the_others(camera: Camera, standing: Sequence[Camera], compared: GroundComparison) -> ChosenSide:
-    """On the side on which it stands with another one, if that is clear, and the ground does not look otherwise."""
+    """Return the side on which it stands with another one, if that is clear, and the ground does not look otherwise."""
     sides = (camera, twin(camera))
     metres = [_distance(one, standing) for one in sides]
     nearer = int(np.argmin(metres))
     taken, near, far = sides[nearer], metres[nearer], metres[1 - nearer]
     alike, otherwise = compared.correlations[nearer], compared.correlations[1 - nearer]
-    if near <= ON_ONE_MOUNT * far and alike > otherwise - SPEAKS_AGAINST:
+    # Stands may be alike: the ground may speak a little for the other side.
+    if near <= 0.25 * far and alike > otherwise - 0.1:
         return ChosenSide(
             taken, f"taken to stand on the {side_of(taken)} side, {near:.1f} m from the nearest camera", decided=True
         )
@@ -120,5 +113,5 @@ def _clearness(camera: Camera, standing: Sequence[Camera]) -> float:
 
 
 def _distance(camera: Camera, standing: Sequence[Camera]) -> float:
-    """To the nearest of others, m."""
-    return min(float(np.linalg.norm(camera.pose.position - other.pose.position)) for other in standing)
+    """Return the distance to the nearest of others, m."""
+    return min(camera.distance_m(other) for other in standing)

@@ -1,4 +1,4 @@
-"""The markings of a field as a search over all poses needs them: points to project, and distances on the ground."""
+"""Maps of a field's markings for a search over all poses: points to project, and distances on the ground."""
 
 from __future__ import annotations
 
@@ -13,24 +13,10 @@ from worker.calibration.geometry.camera import Array
 from worker.calibration.geometry.field import Field, Marking
 from worker.calibration.relocalisation.line_view import labelled_places
 
-POINTS = 420
-"""About so many points on the markings are projected by each pose of a population."""
-FINE_M = 0.1
-BEYOND_M = 6.0
-"""How far beside the markings of the field the map of distances reaches."""
-CELLS_A_SIDE = 700
-"""About so many cells the map of distances has along the field; never finer than 5 cm."""
-SHORTEST_LINE = 0.03
-"""Of the longer side of the field: shorter straight pieces (ticks, dashes) name no line that an image line could be."""
-SAME_LINE_M = 0.3
-"""Two places of a field turned by half a turn are the same marking when they are no farther apart."""
-ALIKE_M = 0.05
-"""Circles whose radii differ by less are of one size."""
-
 
 @dataclass(frozen=True)
 class FieldMap:
-    """`points` (N, 3) m along the markings; `joined` (N,): whether the next point continues the same marking.
+    """Points (N, 3) m along the markings; `joined` (N,): True where the next point continues the same marking.
 
     `nearest` (rows, columns, 2): from the nearest paint to each cell of the ground, m; the cell of row 0, column 0 has
     its centre at `origin` (2,) m and cells are `cell_m` wide. `lines_along_x`: y (m) of the straight lines that run
@@ -51,18 +37,25 @@ class FieldMap:
     def of(cls, field: Field) -> FieldMap:
         """Return the map of a field, its roof included; spots are too small to be seen from afar."""
         lines = [marking for marking in field.markings() if not marking.spot]
-        fine = [_resampled(line, FINE_M) for line in lines]
-        step = max(FINE_M, FINE_M * sum(len(points) for points in fine) / POINTS)
+        fine_m = 0.1
+        fine = [_resampled(line, fine_m) for line in lines]
+        # Approximate number of points on the markings that each pose of a population projects.
+        step = max(fine_m, fine_m * sum(len(points) for points in fine) / 420)
         coarse = [_resampled(line, step) for line in lines]
         everywhere = np.concatenate(fine)
         half = np.abs(everywhere).max(axis=0)
-        cell = max(0.05, 2 * float(half.max()) / CELLS_A_SIDE)
-        shortest = SHORTEST_LINE * 2 * float(half.max())
+        # Approximate number of cells of the map of distances along the field; never finer than 5 cm.
+        cell = max(0.05, 2 * float(half.max()) / 700)
+        # Least length of a straight piece, as a part of the longer side of the field: shorter ones (ticks, dashes) name
+        # no line that an image line could be.
+        shortest = 0.03 * 2 * float(half.max())
+        # Margin of the map of distances beside the markings of the field.
+        beyond_m = 6.0
         return cls(
             field.lift(np.concatenate(coarse)).astype(np.float32),
             np.concatenate([np.arange(len(points)) < len(points) - 1 for points in coarse]),
-            _from_nearest(everywhere, -half - BEYOND_M, half + BEYOND_M, cell),
-            -half - BEYOND_M,
+            _from_nearest(everywhere, -half - beyond_m, half + beyond_m, cell),
+            -half - beyond_m,
             cell,
             _straight(lines, 0, shortest),
             _straight(lines, 1, shortest),
@@ -71,7 +64,7 @@ class FieldMap:
         )
 
     def cells(self, x: Array, y: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """Row and column of the cells of ground places; -1 for both where the map does not reach."""
+        """Return row and column of the cells of ground places; -1 for both where the map does not reach."""
         rows, columns = self.nearest.shape[:2]
         column = np.floor((x - self.origin[0]) / self.cell_m + 0.5)
         row = np.floor((y - self.origin[1]) / self.cell_m + 0.5)
@@ -80,21 +73,21 @@ class FieldMap:
 
     @cached_property
     def is_symmetric(self) -> bool:
-        """Whether the field turned by half a turn looks the same, so that each view has a twin."""
+        """True if the field turned by half a turn looks the same, so that each view has a twin."""
         turned = -self.points[:, :2].astype(float)
         row, column = self.cells(turned[:, 0], turned[:, 1])
-        return bool(np.linalg.norm(self.nearest[row, column], axis=-1).max() < SAME_LINE_M)
+        return bool(np.linalg.norm(self.nearest[row, column], axis=-1).max() < 0.3)
 
 
 def _resampled(line: Marking, step: float) -> Array:
-    """Points (n, 2) about every `step` metres on the centre of a marking, both ends included."""
+    """Return points (n, 2) about every `step` metres on the centre of a marking, both ends included."""
     along = np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(line.centre, axis=0), axis=1))]
     at = np.linspace(0.0, along[-1], max(2, round(along[-1] / step) + 1))
     return np.stack([np.interp(at, along, line.centre[:, axis]) for axis in (0, 1)], axis=1)
 
 
 def _from_nearest(paint: Array, low: Array, high: Array, cell: float) -> NDArray[np.float32]:
-    """From the nearest of the painted places (n, 2) to each cell between two corners, m."""
+    """Return the vector (m) from the nearest of the painted places (n, 2) to each cell between two corners."""
     columns, rows = (np.ceil((high - low) / cell).astype(int) + 1).tolist()
     free = np.ones((rows, columns), np.uint8)
     column, row = np.rint((paint - low) / cell).astype(int).T
@@ -105,7 +98,7 @@ def _from_nearest(paint: Array, low: Array, high: Array, cell: float) -> NDArray
 
 
 def _straight(lines: list[Marking], axis: int, shortest: float) -> Array:
-    """Where the straight pieces that run along an axis cross the other one, each value once."""
+    """Return the places where straight pieces along an axis cross the other one, each value once."""
     found = set()
     for line in lines:
         for start, end in zip(line.centre[:-1], line.centre[1:], strict=True):
@@ -115,16 +108,18 @@ def _straight(lines: list[Marking], axis: int, shortest: float) -> Array:
 
 
 def _between_circles(closed: list[Array]) -> Array:
-    """From the middle of each circle among closed polylines (n, 2) to those of others of its size, (R, 2)."""
+    """Return the moves (R, 2) from each circle among closed polylines (n, 2) to others of its size."""
     middles = [line[:-1].mean(axis=0) for line in closed]
     radii = [np.linalg.norm(line - middle, axis=1) for line, middle in zip(closed, middles, strict=True)]
+    # Difference of radii below which circles are of one size.
+    alike_m = 0.05
     circles = [
-        (middle, radius.mean()) for middle, radius in zip(middles, radii, strict=True) if np.ptp(radius) < ALIKE_M
+        (middle, radius.mean()) for middle, radius in zip(middles, radii, strict=True) if np.ptp(radius) < alike_m
     ]
     moves = [
         there - here
         for here, one in circles
         for there, other in circles
-        if here is not there and abs(one - other) < ALIKE_M
+        if here is not there and abs(one - other) < alike_m
     ]
     return np.unique(np.round(moves, 3), axis=0) if moves else np.zeros((0, 2))

@@ -1,4 +1,4 @@
-"""A population of camera hypotheses: rotations, positions, focal lengths and bends, as arrays of one length."""
+"""Population of camera hypotheses: rotations, positions, focal lengths and bends, as arrays of one length."""
 
 from __future__ import annotations
 
@@ -7,20 +7,20 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.geometry.camera import Array
+from worker.calibration.geometry.arrays import Array, take_rows
 
 FARTHEST_BENT = 0.06
-"""No lens bends more or less than the one that undistorted the view by more than this."""
+"""Largest difference in bend between a hypothesis and the lens that undistorted the view."""
 HALF_TURN = np.diag([-1.0, -1.0, 1.0])
-"""Of the field about its centre."""
+"""Rotation of the field by half a turn about its centre."""
 
 
 @dataclass(frozen=True)
 class Hypotheses:
-    """P cameras: `rotations` (P, 3, 3) world to camera, `positions` (P, 3) m, `focal_px` (P,) in view pixels.
+    """Cameras, P of them: `rotations` (P, 3, 3) world to camera, `positions` (P, 3) m, `focal_px` (P,) in view pixels.
 
-    `bends` (P,): what each lens bends more than the one that undistorted the view: the part by which it puts a point
-    farther from the centre at half the width of the frame, and elsewhere by the square of the distance.
+    `bends` (P,): further distortion beyond that of the lens that undistorted the view: the part by which it puts a
+    point farther from the centre at half the width of the frame, and elsewhere by the square of the distance.
     """
 
     rotations: Array
@@ -30,18 +30,18 @@ class Hypotheses:
 
     @classmethod
     def unbent(cls, rotations: Array, positions: Array, focal_px: Array) -> Hypotheses:
-        """Cameras whose lenses bend as the one that undistorted the view."""
+        """Return cameras whose lenses bend as the one that undistorted the view."""
         return cls(rotations, positions, focal_px, np.zeros(len(positions)))
 
     def __len__(self) -> int:
         return len(self.positions)
 
     def __getitem__(self, chosen: NDArray[np.intp] | NDArray[np.bool_] | slice) -> Hypotheses:
-        return Hypotheses(self.rotations[chosen], self.positions[chosen], self.focal_px[chosen], self.bends[chosen])
+        return take_rows(self, chosen)
 
     @classmethod
     def joined(cls, several: list[Hypotheses]) -> Hypotheses:
-        """All of several populations."""
+        """Return all cameras of several populations."""
         return cls(
             np.concatenate([one.rotations for one in several] or [np.zeros((0, 3, 3))]),
             np.concatenate([one.positions for one in several] or [np.zeros((0, 3))]),
@@ -52,7 +52,7 @@ class Hypotheses:
 
 @dataclass(frozen=True)
 class LensSteps:
-    """How far the lenses of hypotheses may be off: the logarithm of the focal length, and the bend; 0 where known."""
+    """Standard deviations of the lenses of hypotheses: of the log focal length, and of the bend; 0 where known."""
 
     focal: float
     bend: float
@@ -62,7 +62,7 @@ LENS_KNOWN, FOCAL_SOUGHT, LENS_SOUGHT = LensSteps(0.0, 0.0), LensSteps(0.08, 0.0
 
 
 def rotations_of(pan: Array, tilt: Array, roll: Array) -> Array:
-    """Rotations (..., 3, 3), world to camera: `pan` of the view from x towards y, `tilt` below the horizon, rad."""
+    """Return rotations (..., 3, 3), world to camera: `pan` from x towards y, `tilt` below the horizon, rad."""
     zero = np.zeros_like(pan)
     forward = np.stack([np.cos(tilt) * np.cos(pan), np.cos(tilt) * np.sin(pan), -np.sin(tilt)], axis=-1)
     right = np.stack([np.sin(pan), -np.cos(pan), zero], axis=-1)

@@ -18,23 +18,9 @@ from worker.calibration.relocalisation.hypotheses import Hypotheses, rotations_o
 from worker.calibration.relocalisation.line_view import LineView
 from worker.calibration.relocalisation.rotation_voting import Direction
 
-ALONG = 0.012
-"""How far, rad, the plane of a segment may be from a direction that it is taken to run along."""
-HIGHEST_M, HEIGHTS = 50.0, 22
-TOGETHER = 0.01
-"""Segments whose measures differ by less than such a part are pieces of one line."""
-MOST_LINES = 9
-OFF_M, OFF_OF_HEIGHT = 0.1, 0.02
-"""How far a line may be from its marking and still count: so much, and such a part of the height of the camera."""
-TRIED_FIRST, TRIED_SECOND = 40, 6
-"""Matches on the first axis that are gone on with, and on the second for each of them."""
-ALONG_THE_FIELD = 14
-"""Where nothing measures the second axis, so many places along the field are tried."""
-BESIDE = 1.3
-
 
 def positions(field: FieldMap, view: LineView, direction: Direction, most: int) -> Hypotheses:
-    """Return at most so many hypotheses for each way that the field may be turned under the camera."""
+    """Return at most `most` hypotheses for each way that the field may be turned under the camera."""
     found = []
     for turn in range(2 if field.is_symmetric else 4):
         rotation = rotations_of(*(direction.pan_tilt_roll + [turn * np.pi / 2, 0, 0]))
@@ -46,10 +32,12 @@ def positions(field: FieldMap, view: LineView, direction: Direction, most: int) 
 
 
 def _positions(field: FieldMap, view: LineView, rotation: Array, focal: float) -> Array:
-    """Positions (n, 3), the best matched first."""
+    """Return positions (n, 3), the best matched first."""
     normal = view.normals(focal) @ rotation
-    along_x = (np.abs(normal[:, 0]) < ALONG) & (np.abs(normal[:, 0]) < np.abs(normal[:, 1]))
-    along_y = (np.abs(normal[:, 1]) < ALONG) & ~along_x
+    # Largest angle, rad, between the plane of a segment and a direction along which it runs.
+    most_rad = 0.012
+    along_x = (np.abs(normal[:, 0]) < most_rad) & (np.abs(normal[:, 0]) < np.abs(normal[:, 1]))
+    along_y = (np.abs(normal[:, 1]) < most_rad) & ~along_x
     lengths = view.lengths
     on_y = _lines(normal[along_x, 2] / normal[along_x, 1], lengths[along_x])
     on_x = _lines(normal[along_y, 2] / normal[along_y, 0], lengths[along_y])
@@ -65,65 +53,70 @@ def _positions(field: FieldMap, view: LineView, rotation: Array, focal: float) -
 
 
 def _lines(measures: Array, lengths: Array) -> tuple[Array, Array]:
-    """Measures (n,) of lines and their lengths, out of those of their segments; the longest lines alone."""
+    """Merge the measures and lengths of segments into those (n,) of lines; the longest lines alone."""
     order = np.argsort(measures)
     measures, lengths = measures[order], lengths[order]
     if len(measures) == 0:
         return measures, lengths
-    new = np.diff(measures, prepend=measures[0]) >= TOGETHER * (1 + np.abs(measures))
+    # Relative difference of measures below which segments are pieces of one line.
+    new = np.diff(measures, prepend=measures[0]) >= 0.01 * (1 + np.abs(measures))
     line = np.cumsum(new)
     weight = np.bincount(line, lengths)
     mean = np.bincount(line, lengths * measures) / weight
-    longest = np.argsort(-weight)[:MOST_LINES]
+    longest = np.argsort(-weight)[:9]
     return mean[longest], weight[longest].astype(float)
 
 
 def _matched(
     first: tuple[Array, Array], first_markings: Array, second: tuple[Array, Array], second_markings: Array, half: float
 ) -> list[tuple[float, float, float, float]]:
-    """Height and place on the first axis by matches there, and a place on the second; each with a score."""
+    """Return height and place on the first axis by matches there, and a place on the second; each with a score."""
     scaled = _heights_and_places(first[0], first_markings)
     scores = _score(first, first_markings, *scaled.T)
     found = []
-    for n in np.argsort(-scores)[:TRIED_FIRST]:
+    reach = 1.3
+    for n in np.argsort(-scores)[:40]:
         height, place = scaled[n].tolist()
         if len(second[0]) and len(second_markings):
             places = (second_markings[None] - height * second[0][:, None]).ravel()
             others = _score(second, second_markings, np.full(len(places), height), places)
-            best = np.argsort(-others)[:TRIED_SECOND]
+            best = np.argsort(-others)[:6]
             found += [(height, place, float(places[m]), float(scores[n] + others[m])) for m in best]
         else:
-            places = np.linspace(-BESIDE * half, BESIDE * half, ALONG_THE_FIELD)
+            # Nothing measures the second axis.
+            places = np.linspace(-reach * half, reach * half, 14)
             found += [(height, place, float(other), float(scores[n])) for other in places]
     return found
 
 
 def _heights_and_places(measures: Array, markings: Array) -> Array:
-    """Heights and places (n, 2) that put two lines on two markings, or one line on one marking from a usual height."""
+    """Return heights and places (n, 2) that put two lines, or one from a usual height, on markings."""
     markings_of_pairs = _ordered_pairs(markings)
     lines_of_pairs = np.array(list(combinations(measures, 2))).reshape(-1, 2)
     apart = markings_of_pairs[:, 0] - markings_of_pairs[:, 1]
     height = apart / (lines_of_pairs[:, :1] - lines_of_pairs[:, 1:])
     place = markings_of_pairs[:, 0] - height * lines_of_pairs[:, :1]
-    possible = (height > LOWEST_M) & (height < HIGHEST_M)
+    highest_m = 50.0
+    possible = (height > LOWEST_M) & (height < highest_m)
     by_two = np.stack([height[possible], place[possible]], axis=1)
 
-    usual = np.geomspace(LOWEST_M, HIGHEST_M, HEIGHTS)[:, None, None]
+    usual = np.geomspace(LOWEST_M, highest_m, 22)[:, None, None]
     by_one = np.stack(np.broadcast_arrays(usual, markings - usual * measures[:2, None]), axis=-1).reshape(-1, 2)
     return np.concatenate([by_two, by_one])
 
 
 def _ordered_pairs(values: Array) -> Array:
-    """All pairs (n, 2) of two different values, in both orders."""
+    """Return all pairs (n, 2) of two different values, in both orders."""
     return np.array(list(permutations(values, 2))).reshape(-1, 2)
 
 
 def _score(lines: tuple[Array, Array], markings: Array, heights: Array, places: Array) -> Array:
-    """For each height and place (n,) the share of the length of the lines that lies on `markings`, in order (m,)."""
+    """Return, for each height and place (n,), the share of the length of the lines on `markings`, in order (m,)."""
     if len(heights) == 0:
         return np.zeros(0)
     measures, lengths = lines
     at = heights[:, None] * measures + places[:, None]
     off = np.abs(at - markings[np.searchsorted((markings[1:] + markings[:-1]) / 2, at)])
-    near = np.exp(-((off / (OFF_M + OFF_OF_HEIGHT * heights[:, None])) ** 2))
+    # Distance from its marking at which a line counts 1/e: so much, and a part of the height of the camera.
+    near = np.exp(-((off / (0.1 + 0.02 * heights[:, None])) ** 2))
     return np.asarray(near @ lengths / lengths.sum())

@@ -1,4 +1,4 @@
-"""What a frame shows of lines, without the distortion of its lens: segments, places on paint, distances to paint."""
+"""Lines of a frame without the distortion of its lens: segments, places on paint, distances to paint."""
 
 from __future__ import annotations
 
@@ -13,18 +13,7 @@ from worker.calibration.geometry.camera import Array
 from worker.calibration.geometry.lens import Lens
 
 WIDTH_PX = 480
-"""Width of a frame in view pixels: half a pixel of it is what hypotheses are told apart by."""
-WIDEST = 1.3
-"""Undistorted views are cut where they reach farther from the principal point, in widths of a frame."""
-PAINT = 110
-"""Response, 0..255, from which a pixel of the shrunk response is paint."""
-FARTHEST_PX = 60.0
-"""Distances to paint are cut here, view pixels."""
-MOST_SEGMENTS, SHORTEST_SEGMENT_PX = 140, 10.0
-PLACES = 320
-"""So many places on paint are projected to the ground by each pose of a population."""
-BORDER_POINTS = 60
-"""On each side of the frame."""
+"""Width of a frame in view pixels: hypotheses differ by as little as half a pixel of it."""
 
 
 @dataclass(frozen=True)
@@ -59,9 +48,11 @@ class LineView:
         small = np.asarray(
             cv2.resize(response, (2 * WIDTH_PX, round(2 * height * scale)), interpolation=cv2.INTER_AREA), np.uint8
         )
-        border = _undistorted(lens.border(BORDER_POINTS), lens, focal)
-        low = np.maximum(border.min(axis=0), -WIDEST * WIDTH_PX)
-        high = np.minimum(border.max(axis=0), WIDEST * WIDTH_PX)
+        border = _undistorted(lens.border(60), lens, focal)
+        # Limit of undistorted views from the principal point, in widths of a frame.
+        widest = 1.3
+        low = np.maximum(border.min(axis=0), -widest * WIDTH_PX)
+        high = np.minimum(border.max(axis=0), widest * WIDTH_PX)
         shape = tuple(np.floor(high - low).astype(int)[::-1] + 1)
         cells = _cells(_undistorted(middles_of_paint(small) / (2 * scale), lens, focal) - low, shape)
         free = np.ones(shape, np.uint8)
@@ -69,14 +60,15 @@ class LineView:
         covered = np.zeros(shape, np.uint8)
         cv2.fillPoly(covered, [np.rint(border - low).astype(np.int32)], 1)
         distance, label = cv2.distanceTransformWithLabels(free, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
-        chosen = np.random.default_rng(1).permutation(len(cells))[:PLACES]
+        # Number of places on paint that each pose of a population projects to the ground.
+        chosen = np.random.default_rng(1).permutation(len(cells))[:320]
         starts, ends = _segments(small, lens, focal, 2 * scale)
         return cls(
             focal,
             1 / scale,
             (cells[chosen] + low).astype(np.float32),
             float(len(cells)),
-            np.minimum(distance, FARTHEST_PX).astype(np.float32),
+            np.minimum(distance, 60.0).astype(np.float32),
             labelled_places(np.asarray(label), free),
             covered.astype(bool),
             low,
@@ -87,11 +79,11 @@ class LineView:
 
     @property
     def lengths(self) -> Array:
-        """The lengths (S,) of the segments, view pixels."""
+        """Lengths (S,) of the segments, view pixels."""
         return np.asarray(np.linalg.norm(self.ends - self.starts, axis=1))
 
     def to_paint(self, places: Array) -> tuple[Array, NDArray[np.bool_]]:
-        """From places (..., 2) to the nearest paint, view pixels; and which of them lie in the frame."""
+        """Return the vectors from places (..., 2) to the nearest paint, view pixels, and True inside the frame."""
         height, width = self.covered.shape
         at = places - self.corner
         column, row = (
@@ -101,20 +93,20 @@ class LineView:
         return self.nearest[row, column] - at, inside & self.covered[row, column]
 
     def normals(self, focal_px: float) -> Array:
-        """Unit normals (S, 3), in the camera's frame, of the planes through the camera and each segment."""
+        """Return unit normals (S, 3), in the camera's frame, of the planes through the camera and each segment."""
         one = np.ones((len(self.starts), 1))
         normal = np.cross(np.c_[self.starts / focal_px, one], np.c_[self.ends / focal_px, one])
         return np.asarray(normal / np.linalg.norm(normal, axis=1, keepdims=True))
 
 
 def _undistorted(pixels: Array, lens: Lens, focal: float) -> Array:
-    """Pixels (n, 2) of a frame in view pixels; those without a ray are left out."""
+    """Return pixels (n, 2) of a frame in view pixels; those without a ray are left out."""
     plane = lens.undistort(pixels) * focal
     return np.asarray(plane[np.isfinite(plane).all(axis=-1)])
 
 
 def labelled_places(label: NDArray[Any], free: NDArray[np.uint8]) -> NDArray[np.float32]:
-    """Column and row (H, W, 2) of the painted cell, where `free` is 0, whose label each cell has."""
+    """Return column and row (H, W, 2) of the painted cell, where `free` is 0, of each cell's label."""
     row, column = np.nonzero(free == 0)
     of_label = np.zeros((int(label.max()) + 1, 2), np.float32)
     of_label[label[row, column]] = np.stack([column, row], axis=1)
@@ -122,26 +114,27 @@ def labelled_places(label: NDArray[Any], free: NDArray[np.uint8]) -> NDArray[np.
 
 
 def middles_of_paint(small: NDArray[np.uint8]) -> Array:
-    """Pixels (n, 2) of the shrunk response on the middles of what is painted."""
-    depth = cv2.distanceTransform((small > PAINT).astype(np.uint8), cv2.DIST_L2, 5)
+    """Return pixels (n, 2) of the shrunk response on the middles of what is painted."""
+    # Response, 0..255, from which a pixel of the shrunk response is paint.
+    depth = cv2.distanceTransform((small > 110).astype(np.uint8), cv2.DIST_L2, 5)
     middle = (depth > 0) & (depth >= cv2.dilate(depth, np.ones((3, 3), np.uint8)) - 0.25)
     row, column = np.nonzero(middle)
     return np.stack([column, row], axis=1).astype(float)
 
 
 def _cells(places: Array, shape: tuple[int, ...]) -> NDArray[np.intp]:
-    """The cells (n, 2), column and row, that places lie in, each once."""
+    """Return the cells (n, 2), column and row, of places, each once."""
     cells = np.rint(places).astype(np.intp)
     within = (cells >= 0).all(axis=1) & (cells < shape[::-1]).all(axis=1)
     return np.unique(cells[within], axis=0)
 
 
 def _segments(small: NDArray[np.uint8], lens: Lens, focal: float, scale: float) -> tuple[Array, Array]:
-    """Starts and ends (S, 2) of the longest straight segments, view pixels (von Gioi et al., LSD, 2012)."""
+    """Return starts and ends (S, 2) of the longest straight segments, view pixels (von Gioi et al., LSD, 2012)."""
     found = cv2.createLineSegmentDetector(cv2.LSD_REFINE_STD).detect(small)[0]
     pixels = (np.zeros((0, 4)) if found is None else found.reshape(-1, 4)) / scale
     starts, ends = (lens.undistort(pixels[:, part]) * focal for part in (slice(0, 2), slice(2, 4)))
     length = np.linalg.norm(ends - starts, axis=1)
-    longest = np.argsort(-np.nan_to_num(length))[:MOST_SEGMENTS]
-    longest = longest[np.nan_to_num(length[longest]) >= SHORTEST_SEGMENT_PX]
+    longest = np.argsort(-np.nan_to_num(length))[:140]
+    longest = longest[np.nan_to_num(length[longest]) >= 10.0]
     return starts[longest], ends[longest]

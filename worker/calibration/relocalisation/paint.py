@@ -1,4 +1,4 @@
-"""The paint that a frame shows, and how much of it a camera explains."""
+"""Paint that a frame shows, and the share of it that a camera explains."""
 
 from __future__ import annotations
 
@@ -15,8 +15,6 @@ from worker.calibration.geometry.visibility import VisibleLines
 from worker.calibration.relocalisation.line_view import middles_of_paint
 
 WIDTH_PX = 960
-TOLERANCE_PX = 3.0
-"""How far from an expected line paint is explained by it, in pixels of the shrunk frame."""
 
 
 @dataclass(frozen=True)
@@ -34,18 +32,19 @@ class Paint:
         return cls(middles_of_paint(small).astype(np.intp))
 
     def explained_by(self, field: Field, camera: Camera) -> float:
-        """The share of it, 0..1, that lies on the markings as a camera puts them, on the roof of the field."""
+        """Return the share of the paint, 0..1, on the markings as a camera puts them, on the roof of the field."""
         return share(self.on_markings(field, camera))
 
     def on_markings(self, field: Field, camera: Camera) -> NDArray[np.bool_]:
-        """Whether each of the places (n,) lies on a marking as a camera puts it, on the roof of the field."""
+        """True for places (n,) on a marking as a camera puts it, on the roof of the field."""
         small = camera.with_lens(camera.intrinsics.scaled(WIDTH_PX / camera.intrinsics.size[0]))
-        band = line_band(VisibleLines.from_camera(field.line_points(), small), small.intrinsics.size, TOLERANCE_PX)
+        # Distance from an expected line within which it explains paint, in pixels of the shrunk frame.
+        band = line_band(VisibleLines.from_camera(field.line_points(), small), small.intrinsics.size, 3.0)
         column, row = self.middles.T
         inside = row < band.shape[0]
         return inside & (band[np.minimum(row, band.shape[0] - 1), column] > 0)
 
 
 def share(chosen: NDArray[np.bool_]) -> float:
-    """The share 0..1 of the places (n,) that are chosen, 0 where there are none."""
+    """Return the share 0..1 of the places (n,) that are chosen, 0 where there are none."""
     return float(chosen.mean()) if len(chosen) else 0.0

@@ -1,4 +1,4 @@
-"""Poses proposed from nothing but a frame's lines and the field: the whole search, top to bottom."""
+"""Proposals of poses from a frame's lines and the field alone: the whole search, top to bottom."""
 
 from __future__ import annotations
 
@@ -21,20 +21,10 @@ from worker.calibration.relocalisation.repeated_markings import slid_along_field
 from worker.calibration.relocalisation.rotation_voting import Direction, focal_lengths, vote
 from worker.calibration.relocalisation.sought import Place, SoughtCamera, SoughtLens
 
-DIRECTIONS_KNOWN, DIRECTIONS_UNKNOWN = 24, 36
-POSITIONS_KNOWN, POSITIONS_UNKNOWN = 220, 120
-WITH_NEIGHBOURS, NEIGHBOURS, NEIGHBOUR_DEG = 6, 6, (1.5, 1.5, 0.5)
-FIRST_TOLERANCE_PX, DRAWN_TOLERANCE_PX = 8.0, 10.0
-CLIMBING_KNOWN, CLIMBING_UNKNOWN = 60, 160
-CLEARLY_FOUND = 0.45
-"""Agreement from which nothing is drawn at random: what was found from lines is better than any draw."""
-DRAWN, DRAWN_AT_PLACE, CLIMBING_DRAWN = 20000, 6000, 120
-CLIMBING_SLID = 6
-
 
 @dataclass(frozen=True)
 class ProposedCamera:
-    """A lens at a pose, and how well the lines agree with it both ways, 0..1."""
+    """Lens and pose, with their agreement with the lines both ways, 0..1."""
 
     lens: Lens
     pose: Pose
@@ -60,21 +50,22 @@ def propose(field: FieldMap, response: NDArray[np.uint8], sought: SoughtCamera, 
 def _through(
     field: FieldMap, view: LineView, lens: SoughtLens, place: Place, rng: np.random.Generator
 ) -> list[ProposedCamera]:
-    """The proposals for one lens: by lines first, by random draws only where lines do not suffice."""
+    """Return the proposals for one lens: by lines first, by random draws only where lines do not suffice."""
     if view.painted_px == 0:
         return []
     focal, known = focal_lengths(view, lens), lens.is_known
     steps = LENS_KNOWN if known else FOCAL_SOUGHT if lens.is_bend_known else LENS_SOUGHT
-    directions = _with_neighbours(vote(view, focal, DIRECTIONS_KNOWN if known else DIRECTIONS_UNKNOWN, rng), rng)
-    most = POSITIONS_KNOWN if known else POSITIONS_UNKNOWN
+    directions = _with_neighbours(vote(view, focal, 24 if known else 36, rng), rng)
+    most = 220 if known else 120
     by_lines = _at(place, field, Hypotheses.joined([positions(field, view, one, most) for one in directions]))
-    start = _best(field, view, by_lines, FIRST_TOLERANCE_PX, CLIMBING_KNOWN if known else CLIMBING_UNKNOWN)
+    start = _best(field, view, by_lines, 8.0, 60 if known else 160)
     found, scores = climb(field, view, start, steps, rng)
-    if scores.max(initial=0.0) < CLEARLY_FOUND:
+    # Agreement from which nothing is drawn at random: a pose found from lines is better than any draw.
+    if scores.max(initial=0.0) < 0.45:
         drawn = _drawn(field, focal, view.roll_sigma, place, rng)
-        by_draws = _best(field, view, drawn, DRAWN_TOLERANCE_PX, CLIMBING_DRAWN)
+        by_draws = _best(field, view, drawn, 10.0, 120)
         found, scores = climb(field, view, Hypotheses.joined([by_draws, found]), steps, rng)
-    slid = _best(field, view, _at(place, field, slid_along_field(field, found)), LEVELS[-2].tolerance_px, CLIMBING_SLID)
+    slid = _best(field, view, _at(place, field, slid_along_field(field, found)), LEVELS[-2].tolerance_px, 6)
     found, scores = climb(field, view, Hypotheses.joined([found, slid]), steps, rng, LEVELS[-2:])
     return [
         ProposedCamera(
@@ -89,24 +80,24 @@ def _through(
 
 
 def _drawn(field: FieldMap, focal: Array, roll_sigma: float, place: Place, rng: np.random.Generator) -> Hypotheses:
-    """Cameras drawn at random: where they are known to stand, or else from where fields are filmed."""
+    """Draw cameras at random: where they are known to stand, or else from where fields are filmed."""
     if place.position is None:
-        return _at(place, field, draw(field, focal, roll_sigma, DRAWN, rng))
-    drawn = draw_at(field, focal, roll_sigma, place.position, place.radius_m, DRAWN_AT_PLACE, rng)
+        return _at(place, field, draw(field, focal, roll_sigma, 20000, rng))
+    drawn = draw_at(field, focal, roll_sigma, place.position, place.radius_m, 6000, rng)
     return _at(place, field, drawn)
 
 
 def _with_neighbours(directions: list[Direction], rng: np.random.Generator) -> list[Direction]:
-    """The directions, and some around the best ones: votes of a strongly bent or noisy picture are off by a degree."""
+    """Return the directions, and some around the best ones: votes of a noisy picture are off by a degree."""
     return directions + [
-        replace(one, pan_tilt_roll=one.pan_tilt_roll + np.radians(NEIGHBOUR_DEG) * rng.normal(size=3))
-        for one in directions[:WITH_NEIGHBOURS]
-        for _ in range(NEIGHBOURS)
+        replace(one, pan_tilt_roll=one.pan_tilt_roll + np.radians((1.5, 1.5, 0.5)) * rng.normal(size=3))
+        for one in directions[:6]
+        for _ in range(6)
     ]
 
 
 def _at(place: Place, field: FieldMap, cameras: Hypotheses) -> Hypotheses:
-    """Those cameras that stand where they may, on a symmetric field after half a turn of it where that is needed."""
+    """Return the cameras that stand where they may, on a symmetric field after half a turn of it if needed."""
     if place.is_anywhere:
         return cameras
     here = place.allows(cameras.positions)
@@ -122,7 +113,7 @@ def _best(field: FieldMap, view: LineView, cameras: Hypotheses, tolerance_px: fl
 
 
 def _bent_more(lens: Lens, bend: float) -> Lens:
-    """The lens with another one before it that bends by a part at half the width of the frame, as to fourth powers."""
+    """Return the lens behind another one that bends by a part at half the width of the frame, up to fourth powers."""
     if bend == 0.0:
         return lens
     distortion = lens.distortion.copy()
@@ -132,7 +123,7 @@ def _bent_more(lens: Lens, bend: float) -> Lens:
 
 
 def _zoomed(lens: Lens, by: float) -> Lens:
-    """The lens with a focal length so many times as long that bends the picture as it did."""
+    """Return the lens with a focal length so many times as long that bends the picture as before."""
     if by == 1.0:
         return lens
     matrix = lens.matrix.copy()

@@ -1,4 +1,4 @@
-"""A camera found from nothing, with a verdict: proposed by lines, refined onto measured lines, judged beside rivals.
+"""Relocalisation with a verdict: a camera proposed by lines, refined onto measured lines, judged beside rivals.
 
 A first pose has no stored one beside it. In place of "moved" and "the stored pose is better" it is asked whether a
 clearly different pose explains the frame nearly as well.
@@ -29,52 +29,30 @@ from worker.calibration.relocalisation.sought import SoughtCamera
 TOO_LITTLE_PAINT = frozenset({"no-lines", "few-lines"})
 BEGUN_ANEW = TOO_LITTLE_PAINT | {"lines"}
 BEGUN_ANEW_WITH_OTHER_LENSES = BEGUN_ANEW | {"implausible", "not-unique"}
-"""Where the search ends for such a reason, it is begun anew with other draws, through other lenses if there are any,
-and ..."""
-FAINT = 1.6
-"""... if there was too little paint, or that has been done once, with the network's probabilities times so much: then
-faint paint is paint as well, and so is more that is none."""
-ATTEMPTS_KNOWN_LENS, ATTEMPTS_SOUGHT_LENS = 3, 2
-"""How often it is begun at most: to search for a lens too is dear."""
-REFINED, MUCH_WORSE = 4, 0.12
-"""So many proposals are refined, of those whose agreement is lower than that of the best by no more than this."""
-LOOKED_FARTHER_KNOWN_LENS, LOOKED_FARTHER_SOUGHT_LENS = REFINED, 2
-"""For so many of those, the best ones, lines are looked for farther off as well: with a lens that is dear."""
-PROPOSED_APART, DIFFERENT = 0.04, 0.01
-"""Proposals, and refined poses, are different that put the markings in view farther apart than this part of the width
-of the frame, on mean."""
-LEAST_FOUND = 0.7
-"""Of the expected lines, beyond chance. Right poses on real frames find 0.86 and more, wrong ones up to 0.9."""
-LEAST_FOUND_IN_PLACE, EXPLAINED_IN_PLACE = 0.6, 0.85
-"""The same, as a job asks for it, of a camera that is sought where it stood, through its own lens, and where so much of
-the paint is explained: there are few other poses from which it could be."""
+"""Reasons after which the search begins anew with other draws, through other lenses if there are any."""
+REFINED = 4
+"""Most proposals that are refined."""
+DIFFERENT = 0.01
+"""Mean distance between the markings in view of two different refined poses, as a part of the width of the frame."""
 LEAST_OVERLAP = 0.2
-"""Intersection over union, as lengths of line, of what the network sees and what the pose expects. Edges of other
-things lie along a line here and there, and a few lines of a pose are found by them alone. Right poses on rendered and
-real views overlap by 0.27 and more; a wrong one that saw 0.93 of its two lines in the grain of a floor did by 0.12."""
-RIVAL_OVERLAP, MORE_MISSED, FEW_MISSED, MORE_EXPLAINED, LESS_AGREEMENT = 0.8, 2.5, 0.05, 0.05, 0.15
-OWN_PAINT, MUCH_MORE_EXPLAINED, MORE_SEEN, ALIKE_EXPLAINED = 0.02, 0.2, 0.04, 0.01
-LESS_EXACT = 1.4
-"""A different pose may be the true one that agrees little less both ways, and which misses no more than so many times
-as much of its lines and a few more, or explains more of the paint, or alone explains so much of it and overlaps with
-the lines by this part of what the best does. It is not where it explains nothing that the best does not explain, and
-the best explains more: a little if it misses as much, much if it misses less; or where the best explains as much and
-misses so much less: yard lines farther on, one of them where there is none. Nor is it where it explains no more, and
-its lines lie so many times as far from it."""
-LEAST_SURE, LEAST_SURE_OF_LENS = 0.0025, 0.00125
-"""How far the markings in view may be from where the best pose puts them, of the width of the frame (rms, one standard
-deviation), through a lens that is known and one that is found. Pose and lens that slide together, one to make up for
-the other, keep every limit of a pose alone. Right ones on rendered views are sure to 0.0012 and better where the lens
-is found, wrong ones to 0.006 and worse."""
-BORDER_POINTS = 20
-"""On each side of the frame, where a lens is asked whether it sees all of that."""
+"""Least intersection over union, as lengths of line, of the network's response and the expected lines. Edges of
+other things lie along a line here and there, and a few lines of a pose are found by them alone. Right poses on
+rendered and real views overlap by 0.27 and more; a wrong one that saw 0.93 of its two lines in the grain of a floor
+did by 0.12."""
+MORE_EXPLAINED = 0.05
+"""Share of the paint by which one of two poses explains more than the other."""
+LEAST_SURE = 0.0025
+"""Largest standard deviation (rms) of the markings in view by the best pose, as a part of the width of the frame,
+through a lens that is known; half of it through one that is found. Pose and lens that slide together, one to make up
+for the other, keep every limit of a pose alone. Right ones on rendered views are sure to 0.0012 and better where the
+lens is found, wrong ones to 0.006 and worse."""
 
 Reason = Literal["no-lines", "lines", "few-lines", "implausible", "not-unique", "not-confirmed"]
 
 
 @dataclass(frozen=True)
 class NotFound:
-    """Why a camera that was found is not taken: the `reason` in a word, and in words with numbers and what to do."""
+    """Reason why a camera that was found is not taken, in a word and in words with numbers and what to do."""
 
     reason: Reason
     words: str
@@ -82,9 +60,7 @@ class NotFound:
 
 @dataclass(frozen=True)
 class Relocalisation:
-    """What was found for one camera: candidates, the best first; `refusal`: why the best one is not taken, None where
-    it is; `remarks`: what was assumed.
-    """
+    """Candidates for one camera, the best first; why that is refused, or None; and the assumptions made."""
 
     candidates: Sequence[Candidate]
     refusal: NotFound | None
@@ -109,8 +85,9 @@ def relocalise(
     observed = FrameObservations.of(field, channels, response)
     candidates = list[Candidate]()
     looked, through = observed, sought
-    attempts = ATTEMPTS_SOUGHT_LENS if sought.is_lens_sought else ATTEMPTS_KNOWN_LENS
-    farther = LOOKED_FARTHER_SOUGHT_LENS if sought.is_lens_sought else LOOKED_FARTHER_KNOWN_LENS
+    # To search for a lens too is dear.
+    attempts = 2 if sought.is_lens_sought else 3
+    farther = 2 if sought.is_lens_sought else REFINED
     for attempt in range(attempts):
         pulse()
         proposals = [
@@ -137,12 +114,13 @@ def relocalise(
         if sought.other_lenses:
             through = replace(sought, lenses=sought.other_lenses)
         if found.refusal.reason in TOO_LITTLE_PAINT or attempt > 0:
-            looked = observed.strengthened(FAINT)
+            # Then faint paint is paint as well, and so is more that is none.
+            looked = observed.strengthened(1.6)
     return found
 
 
 def _to_choose_from(field: Field, markings: FieldMap, candidates: Sequence[Candidate]) -> list[Candidate]:
-    """The best candidates, and each other one that may be the true one as well."""
+    """Return the best candidates, and each other one that may be the true one as well."""
     best, others = candidates[:REFINED], candidates[REFINED:]
     return [*best, *(rivals(field, markings, best[0], others) if others else ())]
 
@@ -150,13 +128,13 @@ def _to_choose_from(field: Field, markings: FieldMap, candidates: Sequence[Candi
 def _distinct(
     field: Field, markings: FieldMap, sought: SoughtCamera, proposals: Sequence[ProposedCamera]
 ) -> list[Camera]:
-    """The cameras to be refined: good beside the best, and different from each other."""
+    """Return the cameras to be refined: good beside the best, and different from each other."""
     chosen = list[Camera]()
     for one in proposals:
-        if len(chosen) == REFINED or one.agreement < proposals[0].agreement - MUCH_WORSE:
+        if len(chosen) == REFINED or one.agreement < proposals[0].agreement - 0.12:
             break
         camera = Camera(sought.id, one.lens, one.pose, ignored=sought.ignored)
-        if all(_differ(field, markings, other, camera, PROPOSED_APART) for other in chosen):
+        if all(_differ(field, markings, other, camera, 0.04) for other in chosen):
             chosen.append(camera)
     return chosen
 
@@ -164,12 +142,14 @@ def _distinct(
 def why_not_taken(
     field: Field, markings: FieldMap, sought: SoughtCamera, candidates: Sequence[Candidate]
 ) -> NotFound | None:
-    """Why the best candidate is not taken. Whether it is exact enough a calibration says that begins with it."""
+    """Return why the best candidate is not taken, None if it is; a calibration will judge its exactness."""
     if not candidates:
         return NotFound("no-lines", "no lines of a field are seen in the frame; is the view free and lit?")
     best, *others = candidates
     seen = best.evidence
-    if seen.agreement < LEAST_FOUND and not _is_likely_in_place(sought, best):
+    # Least share of the expected lines found, beyond chance. Right poses on real frames find 0.86 and more, wrong ones
+    # up to 0.9.
+    if seen.agreement < 0.7 and not _is_likely_in_place(sought, best):
         return NotFound(
             "lines",
             f"no pose explains the lines: at the best one {seen.share:.0%} of the markings in view are seen "
@@ -185,7 +165,7 @@ def why_not_taken(
     if best.residual_px is None or best.sigma is None:
         return NotFound("few-lines", "too few points of lines could be measured; is the view free and lit?")
     width = best.camera.intrinsics.size[0]
-    least_sure_px = width * (LEAST_SURE_OF_LENS if sought.is_lens_sought else LEAST_SURE)
+    least_sure_px = width * (LEAST_SURE / 2 if sought.is_lens_sought else LEAST_SURE)
     if best.shift_px is not None and best.shift_px > least_sure_px:
         off = (
             f"the markings may lie {best.shift_px:.1f} pixels from where the best pose puts them (at most "
@@ -230,68 +210,78 @@ def rivals(field: Field, markings: FieldMap, best: Candidate, others: Iterable[C
 
 
 def _is_likely_in_place(sought: SoughtCamera, best: Candidate) -> bool:
-    """Whether a camera that is turned on its mount is found by fewer of its lines than one that may stand anywhere."""
+    """True if a camera is found turned on its mount, which needs fewer of its lines than one anywhere."""
     if sought.place.position is None or sought.is_lens_sought:
         return False
-    return best.evidence.agreement >= LEAST_FOUND_IN_PLACE and best.explained >= EXPLAINED_IN_PLACE
+    # There are few other poses from which it could be.
+    return best.evidence.agreement >= 0.6 and best.explained >= 0.85
 
 
 def sees_all_of_its_frame(lens: Lens) -> bool:
-    """Whether each pixel of the frame has a ray: whether the model grows as far as to the corners."""
-    return bool(np.isfinite(lens.undistort(lens.border(BORDER_POINTS))).all())
+    """True if each pixel of the frame has a ray: if the model grows as far as to the corners."""
+    return bool(np.isfinite(lens.undistort(lens.border(20))).all())
 
 
 def explains_nearly_as_well(other: Candidate, best: Candidate) -> bool:
-    """Whether another candidate may be the true one: it misses little more, and explains little less of the paint."""
-    if other.agreement < best.agreement - LESS_AGREEMENT:
+    """True if another candidate may be the true one.
+
+    It agrees little less both ways; and it misses hardly more of its lines, or explains more of the paint, or explains
+    paint that the best does not and overlaps with the lines nearly as the best does. It may not if it explains nothing
+    of its own and the best outdoes it, nor if it explains no more and lines lie clearly farther from it.
+    """
+    if other.agreement < best.agreement - 0.15:
         return False
-    missed, its = (1 - one.evidence.agreement for one in (best, other))
-    has_paint_of_its_own = share(other.explains & ~best.explains) > OWN_PAINT
+    missed, other_missed = (1 - one.evidence.agreement for one in (best, other))
+    has_paint_of_its_own = share(other.explains & ~best.explains) > 0.02
     if not has_paint_of_its_own and _is_outdone(other, best):
         return False
     if other.explained <= best.explained and _is_less_exact(other, best):
         return False
     return (
-        its < MORE_MISSED * missed + FEW_MISSED
+        other_missed < 2.5 * missed + 0.05
         or other.explained > best.explained + MORE_EXPLAINED
-        # What misses clearly more, and explains nothing that the best does not explain, is a worse reading of the same.
-        or (has_paint_of_its_own and other.overlap.iou > RIVAL_OVERLAP * best.overlap.iou)
+        or (has_paint_of_its_own and other.overlap.iou > 0.8 * best.overlap.iou)
     )
 
 
 def _is_less_exact(other: Candidate, best: Candidate) -> bool:
-    """Whether lines lie clearly farther from the other one of two that both were measured."""
+    """True if both were measured and lines lie clearly farther from the other one."""
     if other.residual_px is None or best.residual_px is None:
         return False
-    return other.residual_px > LESS_EXACT * best.residual_px
+    return other.residual_px > 1.4 * best.residual_px
 
 
 def _is_outdone(other: Candidate, best: Candidate) -> bool:
-    """Whether the best of two that explain the same paint explains more of it, or sees more of its lines."""
+    """True if the best of two that explain the same paint explains more of it, or sees more of its lines.
+
+    It explains a little more if the other misses as many lines, much more if the other misses fewer, and as much if the
+    other misses clearly more: yard lines farther on, one of them where there is none.
+    """
     misses_more = best.evidence.agreement - other.evidence.agreement
     explains_less = best.explained - other.explained
-    if misses_more > MORE_SEEN:
-        return explains_less > -ALIKE_EXPLAINED
-    return explains_less > (MORE_EXPLAINED if misses_more >= 0 else MUCH_MORE_EXPLAINED)
+    if misses_more > 0.04:
+        return explains_less > -0.01
+    return explains_less > (MORE_EXPLAINED if misses_more >= 0 else 0.2)
 
 
 def twin(camera: Camera) -> Camera:
-    """The camera that sees the same of a field which half a turn about its centre leaves as it is."""
+    """Return the camera that sees the same of a field which half a turn about its centre leaves as it is."""
     pose = camera.pose
     turned = Pose(rotation_vectors(pose.matrix @ HALF_TURN), HALF_TURN @ pose.position)
     return replace(camera, pose=turned)
 
 
 def _differ(field: Field, markings: FieldMap, one: Camera, other: Camera, apart: float) -> bool:
-    """Whether two cameras put the markings that the first one sees elsewhere, by such a part of the frame's width."""
+    """True if two cameras put the markings that the first one sees apart by such a part of the frame's width."""
     width = one.intrinsics.size[0]
     return not mean_shift_px(field, markings, one, other, width) < apart * width
 
 
 def mean_shift_px(field: Field, markings: FieldMap, one: Camera, other: Camera, unseen_px: float) -> float:
-    """How far on mean another camera puts the markings that one has in view; NaN where it has none in view.
+    """Return the mean distance (px) of the markings in view of one camera by it and another; NaN without any.
 
-    On a symmetric field it is the nearer of the other camera and its twin. What that does not see is `unseen_px` off.
+    On a symmetric field it is the nearer of the other camera and its twin. Markings that that does not see count as
+    `unseen_px` off.
     """
     lines = field.line_points().position
     seen = one.project(lines)

@@ -12,18 +12,15 @@ from worker.calibration.geometry.camera import Array
 from worker.calibration.relocalisation.field_map import FieldMap
 from worker.calibration.relocalisation.hypotheses import Hypotheses
 
-ALIKE_M = 0.05
-"""Distances between parallel markings that differ by less are one."""
-LARGEST_SHARE = 0.75
-"""Of the length or width of the field: slides farther than this leave too few of the lines in common."""
-
 
 def slid_along_field(field: FieldMap, cameras: Hypotheses) -> Hypotheses:
-    """Each camera moved by every distance between two parallel lines, or between two circles of one size."""
+    """Return each camera moved by every distance between two parallel lines, or between two circles of one size."""
+    # Longest slide, as a part of the length or width of the field: longer ones leave too few of the lines in common.
+    largest_share = 0.75
     slides = np.concatenate(
         [
-            _slides(field.lines_along_y, np.array([1.0, 0.0, 0.0]), 2 * LARGEST_SHARE * float(field.half_size[0])),
-            _slides(field.lines_along_x, np.array([0.0, 1.0, 0.0]), 2 * LARGEST_SHARE * float(field.half_size[1])),
+            _slides(field.lines_along_y, np.array([1.0, 0.0, 0.0]), 2 * largest_share * float(field.half_size[0])),
+            _slides(field.lines_along_x, np.array([0.0, 1.0, 0.0]), 2 * largest_share * float(field.half_size[1])),
             np.pad(field.between_circles, ((0, 0), (0, 1))),
         ]
     )
@@ -37,7 +34,9 @@ def slid_along_field(field: FieldMap, cameras: Hypotheses) -> Hypotheses:
 
 
 def _slides(places: Array, axis: Array, longest: float) -> Array:
-    """The distances between any two of the places (n,) of parallel lines as moves (m, 3) along an axis."""
-    apart = np.unique(np.round((places[:, None] - places).ravel() / ALIKE_M)) * ALIKE_M
-    apart = apart[(np.abs(apart) > ALIKE_M) & (np.abs(apart) <= longest)]
+    """Return the distances between any two of the places (n,) of parallel lines as moves (m, 3) along an axis."""
+    # Difference below which distances between parallel markings are one.
+    alike_m = 0.05
+    apart = np.unique(np.round((places[:, None] - places).ravel() / alike_m)) * alike_m
+    apart = apart[(np.abs(apart) > alike_m) & (np.abs(apart) <= longest)]
     return np.asarray(apart[:, None] * axis)

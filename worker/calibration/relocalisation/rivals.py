@@ -26,16 +26,16 @@ def tell_rivals_apart(
 
     `known`: other cameras of the field.
     """
-    told = dict(found)
+    results = dict(found)
     several = [one for one, its in found.items() if its.refusal is not None and its.refusal.reason == "not-unique"]
     # Whoever is taken may see the same ground as one that was not told apart before.
     for one in several * len(several):
-        if told[one].refusal is None:
+        if results[one].refusal is None:
             continue
-        alike = _alike(field, markings, told[one].candidates)
+        alike = _alike(field, markings, results[one].candidates)
         # Half a turn of the field away the ground looks different, unless all of it looks alike anywhere.
         poses = [*alike, *(replace(pose, camera=twin(pose.camera)) for pose in alike)]
-        standing = [its.candidates[0].camera for its in told.values() if its.refusal is None]
+        standing = [its.candidates[0].camera for its in results.values() if its.refusal is None]
         compared = ground.compare([pose.camera for pose in poses], [*standing, *known])
         if compared.right is None or (compared.right >= len(alike) and not markings.is_symmetric):
             continue
@@ -43,13 +43,13 @@ def tell_rivals_apart(
         may_stand_there = sought[one].place.allows(taken.camera.pose.position)
         if not may_stand_there or why_not_taken(field, markings, sought[one], [taken]) is not None:
             continue
-        others = [candidate for candidate in told[one].candidates if candidate.camera is not taken.camera]
+        others = [candidate for candidate in results[one].candidates if candidate.camera is not taken.camera]
         remark = f"one of several poses that explain the lines is taken: {compared.in_words(compared.right)}"
-        told[one] = Relocalisation([taken, *others], None, [remark])
-    return told
+        results[one] = Relocalisation([taken, *others], None, [remark])
+    return results
 
 
 def _alike(field: Field, markings: FieldMap, candidates: Sequence[Candidate]) -> list[Candidate]:
-    """The best pose, and all others that explain the lines about as well."""
+    """Return the best pose, and all others that explain the lines about as well."""
     best, *others = candidates
     return [best, *rivals(field, markings, best, others)]

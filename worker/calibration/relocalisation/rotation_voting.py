@@ -1,4 +1,4 @@
-"""Rotations, and focal lengths where they are unknown, under which segments run along the field's two directions.
+"""Votes for rotations, and focal lengths where they are unknown: segments run along the field's two directions.
 
 A segment of a line that runs along x of the field lies in a plane, through the camera, that contains x: the normal of
 the plane is perpendicular to it. Long segments vote for rotations whose x or y is perpendicular to their normals. That
@@ -16,47 +16,35 @@ from worker.calibration.relocalisation.hypotheses import rotations_of
 from worker.calibration.relocalisation.line_view import LineView
 from worker.calibration.relocalisation.sought import SoughtLens
 
-STEP_DEG = 2.0
-STEEPEST_DEG = 78.0
-ROLL_REACH = 8 / 3
-"""How far rolls are tried, in standard deviations of what is expected."""
-COARSE, FINE = 0.02, 0.006
-"""How far, rad, a direction may be from the plane of a segment that votes for it: on the grid, and after."""
 APART_DEG = 4.0
-ROLLED = 0.02
-"""What a roll of one standard deviation takes from the votes."""
-ROUNDS, OFFSPRING, SPREAD_DEG, NARROWER = 7, 48, 1.4, 0.6
-FOCAL_SPREAD, FOCAL_OFFSPRING = 0.06, 5
-FOCAL_RATIO = 1.19
-"""Between two focal lengths that are tried one after the other."""
-QUARTER = np.pi / 2
 
 
 @dataclass(frozen=True)
 class Direction:
-    """How a camera may look: pan (rad, up to quarter turns), tilt and roll, its focal length in view px, its votes."""
+    """Hypothesis of a view: pan (rad, up to quarter turns), tilt and roll, its focal length in view px, its votes."""
 
     pan_tilt_roll: Array
     focal_px: float
     votes: float
 
     def is_like(self, other: Direction, apart_deg: float) -> bool:
-        """Whether both differ by less than so much, and by 4 % of focal length."""
+        """True if both differ by less than `apart_deg`, and by 4 % of focal length."""
         if abs(np.log(self.focal_px / other.focal_px)) > 0.04:
             return False
         return bool(_turned(self.pan_tilt_roll, other.pan_tilt_roll) < np.radians(apart_deg))
 
 
 def focal_lengths(view: LineView, sought: SoughtLens) -> Array:
-    """The focal lengths to be tried, view pixels."""
+    """Return the focal lengths to be tried, view pixels."""
     if sought.is_known:
         return np.array([view.focal_px])
-    count = max(3, round(np.log(sought.longest_px / sought.shortest_px) / np.log(FOCAL_RATIO)) + 1)
+    # Ratio of two focal lengths that are tried one after the other.
+    count = max(3, round(np.log(sought.longest_px / sought.shortest_px) / np.log(1.19)) + 1)
     return np.geomspace(sought.shortest_px, sought.longest_px, count) / view.frame_px
 
 
 def vote(view: LineView, focal_px: Array, most: int, rng: np.random.Generator) -> list[Direction]:
-    """Return at most so many directions, the most voted for first, each with the focal length that suits it."""
+    """Return at most `most` directions, the most voted for first, each with the focal length that suits it."""
     if len(view.starts) == 0:
         return []
     each = max(5, most // len(focal_px))
@@ -72,13 +60,13 @@ def vote(view: LineView, focal_px: Array, most: int, rng: np.random.Generator) -
 
 
 def _peaks(view: LineView, focal: float, count: int) -> list[Direction]:
-    """The peaks of the votes on a grid."""
-    step, most_roll = np.radians(STEP_DEG), ROLL_REACH * view.roll_sigma
-    axes = np.arange(0, np.pi / 2, step), np.arange(step / 2, np.radians(STEEPEST_DEG), step)
+    """Return the peaks of the votes on a grid."""
+    step, most_roll = np.radians(2.0), 8 / 3 * view.roll_sigma
+    axes = np.arange(0, np.pi / 2, step), np.arange(step / 2, np.radians(78.0), step)
     level = np.stack(np.meshgrid(*axes, [0.0], indexing="ij"), axis=-1).reshape(-1, 3)
     # Roll by roll: all of the grid at once takes hundreds of megabytes.
     rolled = [level + [0.0, 0.0, roll] for roll in np.arange(-most_roll, most_roll + step / 2, step)]
-    votes = np.concatenate([_votes(view, directions, focal, COARSE) for directions in rolled])
+    votes = np.concatenate([_votes(view, directions, focal, 0.02) for directions in rolled])
     directions = np.concatenate(rolled)
     peaks = list[Direction]()
     for n in np.argsort(-votes)[: 60 * count]:
@@ -91,35 +79,41 @@ def _peaks(view: LineView, focal: float, count: int) -> list[Direction]:
 
 
 def _climbed(view: LineView, start: Direction, frees_focal: bool, rng: np.random.Generator) -> Direction:
-    """The best direction near a peak, by narrower votes."""
+    """Return the best direction near a peak, by narrower votes."""
+    # Angle, rad, between a direction and the plane of a segment at which its vote is 1/e.
+    tolerance_rad = 0.006
     best = Direction(
-        start.pan_tilt_roll, start.focal_px, float(_votes(view, start.pan_tilt_roll[None], start.focal_px, FINE)[0])
+        start.pan_tilt_roll,
+        start.focal_px,
+        float(_votes(view, start.pan_tilt_roll[None], start.focal_px, tolerance_rad)[0]),
     )
-    for number in range(ROUNDS):
-        narrower = NARROWER**number
-        spread = np.radians(SPREAD_DEG) * narrower
-        offspring = best.pan_tilt_roll + spread * rng.normal(size=(OFFSPRING, 3))
+    for number in range(7):
+        narrower = 0.6**number
+        spread = np.radians(1.4) * narrower
+        offspring = best.pan_tilt_roll + spread * rng.normal(size=(48, 3))
         tried = [best.focal_px]
         if frees_focal:
-            tried += list(best.focal_px * np.exp(FOCAL_SPREAD * narrower * rng.normal(size=FOCAL_OFFSPRING)))
+            tried += list(best.focal_px * np.exp(0.06 * narrower * rng.normal(size=5)))
         for focal in tried:
-            votes = _votes(view, offspring, focal, FINE)
+            votes = _votes(view, offspring, focal, tolerance_rad)
             if votes.max() > best.votes:
                 best = Direction(offspring[votes.argmax()], focal, float(votes.max()))
     return best
 
 
 def _votes(view: LineView, pan_tilt_roll: Array, focal: float, tolerance: float) -> Array:
-    """For each direction (P, 3) the share of the length of all segments that runs along x or y, less for its roll."""
+    """Return, for each direction (P, 3), the share of all segments that runs along x or y, less for its roll."""
     rotations = rotations_of(*pan_tilt_roll.T).astype(np.float32)
     normals = view.normals(focal).astype(np.float32)
     lengths = view.lengths
     off = np.minimum(np.abs(rotations[:, :, 0] @ normals.T), np.abs(rotations[:, :, 1] @ normals.T))
-    rolled = ROLLED * (pan_tilt_roll[:, 2] / view.roll_sigma) ** 2
+    # Votes that a roll of one standard deviation costs.
+    rolled = 0.02 * (pan_tilt_roll[:, 2] / view.roll_sigma) ** 2
     return np.asarray(np.exp(-((off / tolerance) ** 2)) @ lengths / lengths.sum() - rolled)
 
 
 def _turned(one: Array, other: Array) -> float:
-    """The largest of the differences of pan, tilt and roll, rad; a quarter turn of the pan is none."""
+    """Return the largest of the differences of pan, tilt and roll, rad; a quarter turn of the pan is none."""
     pan, tilt, roll = one - other
-    return float(max(abs((pan + QUARTER / 2) % QUARTER - QUARTER / 2), abs(tilt), abs(roll)))
+    quarter = np.pi / 2
+    return float(max(abs((pan + quarter / 2) % quarter - quarter / 2), abs(tilt), abs(roll)))

@@ -1,4 +1,5 @@
-"""Which of the poses that explain a frame's lines alike is right: the one whose ground looks as another camera sees it.
+"""Comparison of the ground between cameras: of poses that explain a frame's lines alike, the right one sees the ground
+as another camera sees it.
 
 Lines repeat themselves along a field and from one half to the other. What is between them does not: worn grass,
 shadows, lettering, players' feet. Cameras of one job have taken their frames at about the same moment.
@@ -18,44 +19,26 @@ from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.ground_view import sampled
 from worker.calibration.robust import USUAL
 
-CELLS_A_SIDE, BESIDE_M = 400, 3.0
-"""So many places along the longer side of the field, and so far beside it, are compared."""
-OFF_PAINT_M, OFF_PAINT_CELLS, OFF_PAINT_PX = 0.4, 2.5, 3.0
-"""No place counts that is nearer to the middle of a line, which looks alike from each pose that explains the lines."""
-LEAST_PX = 0.5
-"""No place counts whose neighbour is nearer than this in the frame, as far away."""
-FINE_CELLS, COARSE_CELLS = 1.0, 3.0
-"""Detail finer than the first is noise, and misplaced from far away; coarser than the second it is light and colour."""
-DARKEST = 4.0
-"""Values below are taken for it: their logarithms are noise."""
-OUTLYING = 3.0
-"""Beyond so many deviations there are players, who stand off the ground: they count no more than that."""
-LEAST_PLACES = 4000
-"""Fewer places that both cameras see say nothing."""
-LEAST_ALIKE, CLEARLY_MORE_ALIKE = 0.35, 0.2
-"""The right pose correlates by so much at least, and by so much more than each of the others. Of rendered pairs of
-cameras anywhere around a field half the right ones reach 0.5, others stay below 0.2 but where stripes are mown; of real
-cameras on one mount right ones reach 0.44 and 0.72, and no others 0.1."""
-
 
 @dataclass(frozen=True)
 class GroundComparison:
-    """How alike others see the ground that several poses of a camera see: `correlations` (P,) with the camera of
-    `others` (P) that sees it most alike, -1..1; 0 where nobody sees enough of the same places.
-    """
+    """Correlations (P,) of the ground by several poses of a camera with the camera of `others` (P) that sees it most
+    alike, -1..1; 0 where nobody sees enough of the same places."""
 
     correlations: Array
     others: Sequence[str]
 
     @property
     def right(self) -> int | None:
-        """The number of the pose that is right, None where that is not clear."""
+        """Number of the pose that is right, None where that is not clear."""
         best = int(self.correlations.argmax())
         next_best = float(np.delete(self.correlations, best).max(initial=0.0))
-        return best if self.correlations[best] >= max(LEAST_ALIKE, next_best + CLEARLY_MORE_ALIKE) else None
+        # Of rendered pairs of cameras anywhere around a field half the right poses reach 0.5, others stay below 0.2 but
+        # where stripes are mown; of real cameras on one mount right ones reach 0.44 and 0.72, and no others 0.1.
+        return best if self.correlations[best] >= max(0.35, next_best + 0.2) else None
 
     def in_words(self, right: int) -> str:
-        """The correlations that speak for the pose of number `right`, as a clause of a sentence."""
+        """Return the correlations that speak for the pose of number `right`, as a clause of a sentence."""
         return (
             f"from there the ground between the lines looks as camera {self.others[right]} sees it (correlation "
             f"{self.correlations[right]:.2f}, otherwise at most {np.delete(self.correlations, right).max():.2f})"
@@ -64,10 +47,9 @@ class GroundComparison:
 
 @dataclass(frozen=True)
 class SharedGround:
-    """The ground of a field as cameras see it: places (H, W, 2) m to compare, how far from the middle of the nearest
-    line they are (H, W), in steps from one place to the next, and `frames`, BGR (height, width, 3), one of each camera,
-    all of about the same moment.
-    """
+    """Ground of a field as cameras see it: places (H, W, 2) m to compare, their distance (H, W) from the middle of
+    the nearest line in steps from one place to the next, and `frames`, BGR (height, width, 3), one of each camera,
+    all of about the same moment."""
 
     pitch: Field
     places: Array
@@ -79,15 +61,17 @@ class SharedGround:
     def of(cls, pitch: Field, frames: Mapping[str, Frame]) -> SharedGround:
         """Return the ground of a field and a little around it."""
         lines = pitch.line_points().position[:, :2]
-        low, high = lines.min(axis=0) - BESIDE_M, lines.max(axis=0) + BESIDE_M
-        step_m = float((high - low).max()) / CELLS_A_SIDE
+        beside_m = 3.0
+        low, high = lines.min(axis=0) - beside_m, lines.max(axis=0) + beside_m
+        step_m = float((high - low).max()) / 400
         x, y = (np.arange(low[axis], high[axis], step_m) for axis in (0, 1))
         places = np.stack(np.meshgrid(x, y), axis=-1)
         bare = np.ones((len(y), len(x)), np.uint8)
         column, row = np.rint((lines - low) / step_m).astype(int).T
         bare[row, column] = 0
         from_paint = cv2.distanceTransform(bare, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
-        near = from_paint < max(OFF_PAINT_M / step_m, OFF_PAINT_CELLS)
+        # Lines look alike from each pose that explains them.
+        near = from_paint < max(0.4 / step_m, 2.5)
         return cls(pitch, places, np.where(near, np.float32(0), from_paint).astype(np.float32), frames)
 
     def compare(self, poses: Sequence[Camera], others: Sequence[Camera]) -> GroundComparison:
@@ -100,7 +84,7 @@ class SharedGround:
         return GroundComparison(alike.max(axis=1), [list(seen)[number] for number in alike.argmax(axis=1)])
 
     def _texture(self, camera: Camera) -> _Texture:
-        """The texture that a frame shows if its camera has this pose and lens; each such pair is computed once."""
+        """Return the texture that a frame shows by this pose and lens; each such pair is computed once."""
         pose, lens = camera.pose, camera.intrinsics
         numbers = np.concatenate([pose.rotation, pose.position, lens.matrix.ravel(), lens.distortion])
         key = camera.id, numbers.tobytes()
@@ -112,30 +96,32 @@ class SharedGround:
         pixels = camera.project(self.pitch.lift(self.places))
         within = inside(pixels, camera.intrinsics.size)
         values, px = sampled(self.frames[camera.id], pixels, within), _least_px(pixels)
-        seen = within & camera.sees(pixels) & (px > LEAST_PX) & (self.from_paint * px > OFF_PAINT_PX)
-        lightness = np.log(np.maximum(values.mean(axis=-1), DARKEST)).astype(np.float32)
-        contrast = _mean(lightness, seen, FINE_CELLS) - _mean(lightness, seen, COARSE_CELLS)
+        seen = within & camera.sees(pixels) & (px > 0.5) & (self.from_paint * px > 3.0)
+        # Least value: logarithms of darker ones are noise.
+        lightness = np.log(np.maximum(values.mean(axis=-1), 4.0)).astype(np.float32)
+        # Finer detail is noise, and misplaced from far away; coarser is light and colour.
+        contrast = _mean(lightness, seen, 1.0) - _mean(lightness, seen, 3.0)
         return _Texture(_without_stripes(contrast, seen), seen)
 
 
 @dataclass(frozen=True)
 class _Texture:
-    """How much lighter each place (H, W) is than the ground around it, in logarithms, where it is `seen` (H, W)."""
+    """Log lightness of each place (H, W) against the ground around it, where it is `seen` (H, W)."""
 
     contrast: NDArray[np.float32]
     seen: NDArray[np.bool_]
 
     def correlation(self, other: _Texture) -> float:
-        """How alike two cameras see the places that both see, -1..1; 0 where these are too few."""
+        """Return the correlation of the places that both cameras see, -1..1; 0 where these are too few."""
         both = self.seen & other.seen
-        if np.count_nonzero(both) < LEAST_PLACES:
+        if np.count_nonzero(both) < 4000:
             return 0.0
         one, another = (_without_outliers(texture.contrast[both]) for texture in (self, other))
         return float(one @ another / np.sqrt(max(float((one @ one) * (another @ another)), 1e-9)))
 
 
 def _least_px(pixels: Array) -> Array:
-    """How far apart (H, W) neighbouring places are in a frame, by their pixels (H, W, 2), where that is least; or 0."""
+    """Return the least distance (H, W) in a frame between neighbouring places at pixels (H, W, 2), any way; or 0."""
     (x_down, x_right), (y_down, y_right) = (np.gradient(pixels[..., axis]) for axis in (0, 1))
     # The smaller singular value of the derivatives.
     total = x_down**2 + x_right**2 + y_down**2 + y_right**2
@@ -144,7 +130,7 @@ def _least_px(pixels: Array) -> Array:
 
 
 def _mean(values: NDArray[np.float32], counted: NDArray[np.bool_], cells: float) -> NDArray[np.float32]:
-    """The mean around each place of those places that are counted."""
+    """Return the mean around each place of those places that are counted."""
     total, share = (
         np.asarray(cv2.GaussianBlur(part, (0, 0), cells))
         for part in (np.where(counted, values, np.float32(0)), counted.astype(np.float32))
@@ -154,17 +140,17 @@ def _mean(values: NDArray[np.float32], counted: NDArray[np.bool_], cells: float)
 
 
 def _without_stripes(values: NDArray[np.float32], counted: NDArray[np.bool_]) -> NDArray[np.float32]:
-    """The values less the means of rows and columns: stripes of mown grass look alike from many poses."""
-    left = np.where(counted, values, np.float32(0))
+    """Return the values less the means of rows and columns: stripes of mown grass look alike from many poses."""
+    remaining = np.where(counted, values, np.float32(0))
     for axis in (0, 1):
-        mean = left.sum(axis=axis, keepdims=True) / np.maximum(counted.sum(axis=axis, keepdims=True), 1)
-        left = np.where(counted, left - mean.astype(np.float32), np.float32(0))
-    return left
+        mean = remaining.sum(axis=axis, keepdims=True) / np.maximum(counted.sum(axis=axis, keepdims=True), 1)
+        remaining = np.where(counted, remaining - mean.astype(np.float32), np.float32(0))
+    return remaining
 
 
 def _without_outliers(values: NDArray[np.float32]) -> Array:
-    """The values around 0, none of them beyond `OUTLYING` deviations."""
+    """Return the values around 0, none of them beyond three deviations."""
     around = values - np.median(values)
-    most = OUTLYING * float(np.median(np.abs(around))) / USUAL
-    held = np.clip(around, -most, most)
-    return np.asarray(held - held.mean(), float)
+    most = 3.0 * float(np.median(np.abs(around))) / USUAL
+    clipped = np.clip(around, -most, most)
+    return np.asarray(clipped - clipped.mean(), float)

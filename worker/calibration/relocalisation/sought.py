@@ -1,4 +1,4 @@
-"""What is known of a camera whose pose is sought: its lens, or how long one may be, and roughly where it stands."""
+"""Prior knowledge of a camera whose pose is sought: its lens, or the range of its focal length, and its rough place."""
 
 from __future__ import annotations
 
@@ -14,24 +14,18 @@ from worker.calibration.geometry.ignored_areas import Ignored
 from worker.calibration.geometry.lens import Intrinsics, Lens
 
 Side = Literal["near", "far", "left", "right"]
-"""Of the field: near is y < 0, far y > 0, left x < 0, right x > 0."""
-SHORTEST_FOCAL, LONGEST_FOCAL = 0.4, 4.5
-"""Of lenses that nothing is known of, in widths of the frame: views of 103° to 13°."""
+"""Sides of the field: near is y < 0, far y > 0, left x < 0, right x > 0."""
 BENDS, OTHER_BENDS = (0.0, -0.07), (-0.035, -0.14)
-"""Of such lenses: the radial term k1 at half the width of the frame, which tells lenses of one bend apart from those of
-another whatever their focal length; the others are looked through where these find nothing. An action camera has -0.2,
-and from there a pose is caught that was proposed with -0.14."""
-WELL_KNOWN = 0.02
-"""Focal lengths that are known to this part need no search."""
-SIGMAS = 2.0
-"""So many standard deviations around a given focal length are searched."""
+"""Distortions of such lenses: the radial term k1 at half the width of the frame, which tells lenses of one bend
+apart from those of another whatever their focal length; the others are tried where these find nothing. An action
+camera has -0.2, and from there a pose is caught that was proposed with -0.14."""
 
 
 @dataclass(frozen=True)
 class SoughtLens:
-    """A lens through which a frame may have been taken, with a focal length between `shortest_px` and `longest_px`.
+    """Lens through which a frame may have been taken, with a focal length between `shortest_px` and `longest_px`.
 
-    `is_bend_known`: whether it bends the picture as `lens` does, or only about so.
+    `is_bend_known`: True if it bends the picture as `lens` does, False if only about so.
     """
 
     lens: Lens
@@ -41,26 +35,27 @@ class SoughtLens:
 
     @classmethod
     def known(cls, lens: Lens) -> SoughtLens:
-        """A lens with its focal length."""
+        """Return a lens with its focal length."""
         return cls(lens, lens.focal_length_px, lens.focal_length_px)
 
     @classmethod
     def around(cls, lens: Lens, uncertain: float) -> SoughtLens:
-        """A lens whose focal length is known to a part (one standard deviation): `WELL_KNOWN` and less is known."""
-        if uncertain <= WELL_KNOWN:
+        """Return a lens with this relative sigma of its focal length, which a small one makes known."""
+        # Relative sigma of a focal length that needs no search.
+        if uncertain <= 0.02:
             return cls.known(lens)
-        reach = 1 + SIGMAS * uncertain
+        reach = 1 + 2.0 * uncertain
         return cls(lens, lens.focal_length_px / reach, lens.focal_length_px * reach)
 
     @property
     def is_known(self) -> bool:
-        """Whether its focal length need not be searched for."""
+        """True if the focal length need not be searched for."""
         return self.shortest_px == self.longest_px
 
 
 @dataclass(frozen=True)
 class Place:
-    """Where a camera may stand: on a `side` of the field, and within `radius_m` of a `position` (3,) m, or anywhere."""
+    """Possible places of a camera: on a `side` of the field, and within `radius_m` of a `position` (3,) m, or any."""
 
     side: Side | None = None
     position: Array | None = None
@@ -68,11 +63,11 @@ class Place:
 
     @property
     def is_anywhere(self) -> bool:
-        """Whether nothing is known."""
+        """True if nothing is known."""
         return self.side is None and self.position is None
 
     def allows(self, positions: Array) -> NDArray[np.bool_]:
-        """Whether a camera may stand at each of the positions (..., 3)."""
+        """True for positions (..., 3) where a camera may stand."""
         x, y = positions[..., 0], positions[..., 1]
         on_side = {"near": y < 0, "far": y > 0, "left": x < 0, "right": x > 0}
         allowed = np.ones(x.shape, dtype=bool) if self.side is None else on_side[self.side]
@@ -83,16 +78,16 @@ class Place:
 
 ANYWHERE = Place()
 MOUNTED_ROLL_DEG, KNOCKED_ROLL_DEG = 3.0, 15.0
-"""How far from level cameras are rolled, one standard deviation: as somebody mounted them, and after a knock that may
-have turned a clamp about any axis."""
+"""Standard deviation of a camera's roll: as somebody mounted it, and after a knock that may have turned a clamp
+about any axis."""
 
 
 @dataclass(frozen=True)
 class SoughtCamera:
-    """A camera without a pose: `lenses` through which it may look, where it may stand, what of its frame is ignored.
+    """Camera without a pose: possible `lenses`, possible place, and ignored parts of its frame.
 
-    `other_lenses`: to be tried in their place if nothing is found through them; `roll_sigma_deg`: how far from level
-    the camera may be rolled about its view, one standard deviation.
+    `other_lenses`: to be tried in their place if nothing is found through them; `roll_sigma_deg`: standard deviation of
+    the camera's roll about its view.
     """
 
     id: str
@@ -104,26 +99,27 @@ class SoughtCamera:
 
     @property
     def size(self) -> tuple[int, int]:
-        """Width and height of its frames."""
+        """Width and height of the frames."""
         return self.lenses[0].lens.size
 
     @property
     def is_lens_sought(self) -> bool:
-        """Whether the lens is to be found along with the pose."""
+        """True if the lens is to be found along with the pose."""
         return not all(one.is_known for one in self.lenses)
 
 
 def unknown_lenses(size: tuple[int, int], bends: Sequence[float] = BENDS) -> list[SoughtLens]:
-    """Lenses of each bend and every usual focal length for a frame (width, height) of whose lens nothing is known."""
+    """Return lenses of each bend and every usual focal length for a frame (width, height) of unknown lens."""
     width = size[0]
     lenses = [_bent(size, float(width), bend) for bend in bends]
-    return [SoughtLens(lens, SHORTEST_FOCAL * width, LONGEST_FOCAL * width, is_bend_known=False) for lens in lenses]
+    # Views of 103° to 13°.
+    return [SoughtLens(lens, 0.4 * width, 4.5 * width, is_bend_known=False) for lens in lenses]
 
 
 def lenses_of_view(
     size: tuple[int, int], field_of_view_deg: float, uncertain: float, bends: Sequence[float] = BENDS
 ) -> list[SoughtLens]:
-    """Lenses of each bend for a horizontal field of view that is known to a part of the focal length."""
+    """Return lenses of each bend for a horizontal field of view with this relative sigma of the focal length."""
     focal = size[0] / 2 / float(np.tan(np.radians(field_of_view_deg) / 2))
     return [replace(SoughtLens.around(_bent(size, focal, bend), uncertain), is_bend_known=False) for bend in bends]
 

@@ -1,4 +1,4 @@
-"""Pictures by which a person judges a lens and a first pose: where the evidence is, and how well it fits."""
+"""Pictures by which a person judges a lens and a first pose: the evidence, and how well it fits."""
 
 from __future__ import annotations
 
@@ -14,62 +14,64 @@ from worker.calibration.rendering.markings import NEW_COLOUR
 from worker.calibration.rendering.overlays import draw_line, legend, outline
 
 WIDTH_PX = 1600
-LEGEND_PX = 180
-ARROW_PX = 12.0
-"""As long as this is the arrow of a residual of the median size."""
-PAPER, GRID = (250, 250, 250), (205, 205, 205)
+PAPER = (250, 250, 250)
 COVERED, BARE = (205, 235, 205), (215, 215, 250)
-CORNER, ARROW, CENTRE = (150, 90, 30), (40, 40, 220), (200, 0, 200)
-CLICKED, MISLABELLED, EXPECTED = (60, 200, 60), (40, 40, 240), (0, 200, 255)
+CORNER = (150, 90, 30)
+EXPECTED = (0, 200, 255)
 
 
 def coverage_picture(found: LensCalibration) -> Frame:
-    """The picture of a camera with every corner that was used, its residual enlarged, and the cells none reached."""
+    """Draw a camera's picture with every corner that was used, its residual enlarged, and the cells none reached."""
     width, height = found.lens.size
     scale = WIDTH_PX / width
     size = (WIDTH_PX, round(height * scale))
     # Below the picture there is room for the legend, which would hide corners.
-    picture = np.full((size[1] + LEGEND_PX, size[0], 3), PAPER, np.uint8)
+    picture = np.full((size[1] + 180, size[0], 3), PAPER, np.uint8)
     rows, columns = found.coverage.cells.shape
     for row, column in np.ndindex(rows, columns):
         box = [round(column * size[0] / columns), round(row * size[1] / rows)]
         end = [round((column + 1) * size[0] / columns), round((row + 1) * size[1] / rows)]
         cv2.rectangle(picture, box, end, COVERED if found.coverage.cells[row, column] else BARE, cv2.FILLED)
-        cv2.rectangle(picture, box, end, GRID, 1)
+        cv2.rectangle(picture, box, end, (205, 205, 205), 1)
     lengths = np.linalg.norm(found.off, axis=1)
-    enlarged = ARROW_PX / max(float(np.median(lengths)) * scale, 1e-9)
+    # Length of the arrow for a residual of the median size.
+    enlarged = 12.0 / max(float(np.median(lengths)) * scale, 1e-9)
     ends = found.corners + enlarged * found.off
+    arrow = (40, 40, 220)
     for corner, end in zip((found.corners + 0.5) * scale - 0.5, (ends + 0.5) * scale - 0.5, strict=True):
         cv2.circle(picture, _fixed(corner), 3 * 16, CORNER, cv2.FILLED, cv2.LINE_AA, shift=4)
-        cv2.line(picture, _fixed(corner), _fixed(end), ARROW, 1, cv2.LINE_AA, shift=4)
-    _cross(picture, (found.lens.matrix[:2, 2] + 0.5) * scale - 0.5, CENTRE, 16)
+        cv2.line(picture, _fixed(corner), _fixed(end), arrow, 1, cv2.LINE_AA, shift=4)
+    centre = (200, 0, 200)
+    _cross(picture, (found.lens.matrix[:2, 2] + 0.5) * scale - 0.5, centre, 16)
     legend(
         picture,
         [
             ("corner of the board", CORNER),
-            (f"residual x {enlarged:.0f}", ARROW),
+            (f"residual x {enlarged:.0f}", arrow),
             (f"no corner here ({1 - found.coverage.share:.0%})", BARE),
-            ("principal point", CENTRE),
+            ("principal point", centre),
         ],
     )
     return picture
 
 
 def clicks_picture(pitch: Field, clicks: Clicks, found: FirstPose, frame: Frame | None) -> Frame:
-    """The pitch as the first pose has it, over the frame if there is one, and each click with where its label is."""
+    """Draw the field by the first pose, over the frame if there is one, and each click with its label's place."""
     width, height = found.camera.intrinsics.size
     picture = np.full((height, width, 3), PAPER, np.uint8) if frame is None else frame.copy()
     thick = max(1, round(width / 1500))
     _draw_pitch(picture, pitch, found.camera, thick)
     expected = found.camera.project(clicks.world)
+    clicked = (60, 200, 60)
+    mislabelled = (40, 40, 240)
     for pixel, place, verdict in zip(clicks.pixel, expected, found.clicks, strict=True):
-        colour = MISLABELLED if verdict.doubted else CLICKED
+        colour = mislabelled if verdict.doubted else clicked
         cv2.circle(picture, _fixed(pixel), 8 * thick * 16, colour, 2 * thick, cv2.LINE_AA, shift=4)
         if np.isfinite(place).all():
             _cross(picture, place, EXPECTED, 6 * thick)
             cv2.line(picture, _fixed(pixel), _fixed(place), colour, thick, cv2.LINE_AA, shift=4)
-    entries = [("pitch at the first pose", NEW_COLOUR), ("click", CLICKED), ("where its label is", EXPECTED)]
-    legend(picture, [*entries, ("does not fit its label", MISLABELLED)])
+    entries = [("pitch at the first pose", NEW_COLOUR), ("click", clicked), ("where its label is", EXPECTED)]
+    legend(picture, [*entries, ("does not fit its label", mislabelled)])
     return picture
 
 
@@ -85,6 +87,6 @@ def _cross(picture: Frame, place: Array, colour: tuple[int, int, int], arm: int)
 
 
 def _fixed(place: Array) -> tuple[int, int]:
-    """Sub-pixel places as OpenCV's drawing takes them, with four bits behind the point; far outside is far enough."""
+    """Return sub-pixel places as OpenCV's drawing takes them, with four bits behind the point, and clipped."""
     x, y = np.rint(np.clip(place, -1e5, 1e5) * 16).astype(int).tolist()
     return x, y

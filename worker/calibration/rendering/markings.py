@@ -1,4 +1,4 @@
-"""What was seen of each marking, in words and colours on the frame: so that a person finds the line that is meant."""
+"""Markings in words and colours on the frame, so that a person finds the line that is meant."""
 
 from __future__ import annotations
 
@@ -17,30 +17,28 @@ ELSEWHERE_COLOUR = (255, 80, 255)
 MISSING_COLOUR = (240, 240, 60)
 WELL_FOUND = 0.7
 WRONG = ((f"found less than {WELL_FOUND:.0%}", MISSING_COLOUR), ("painted elsewhere", ELSEWHERE_COLOUR))
-MOST_LISTED = 12
-TEXT_PX = 0.009
-"""Height of the letters, in widths of the picture."""
 
 
 def colour_of(seen: MarkingReport) -> tuple[int, int, int]:
-    """Blue where all is well, magenta where the paint is elsewhere, cyan where it is hardly found."""
+    """Return blue where all is well, magenta where the paint is elsewhere, cyan where it is hardly found."""
     if seen.is_elsewhere:
         return ELSEWHERE_COLOUR
     return NEW_COLOUR if seen.found >= WELL_FOUND else MISSING_COLOUR
 
 
 def colours_of(pitch: Field, seen: Sequence[MarkingReport]) -> list[tuple[int, int, int]]:
-    """Of each marking of the pitch: blue where nothing is said of it."""
+    """Return the colour of each marking of the field; blue where nothing is said of it."""
     said = {one.name: colour_of(one) for one in seen}
     return [said.get(name, NEW_COLOUR) for name in pitch.whole_names()]
 
 
 def list_wrong(picture: Frame, pitch: Field, camera: Camera, seen: Sequence[MarkingReport]) -> None:
     """Number the markings that are elsewhere or hardly found, the worst first, and list what is wrong in a corner."""
-    wrong = worst(seen)[:MOST_LISTED]
+    wrong = worst(seen)[:12]
     if not wrong:
         return
-    text_px = max(10.0, TEXT_PX * picture.shape[1])
+    # Height of the letters, in widths of the picture.
+    text_px = max(10.0, 0.009 * picture.shape[1])
     scale, thick, pad = text_px / 22, max(1, round(text_px / 16)), round(text_px)
     lines = [f"{number}  {in_words(one)}" for number, one in enumerate(wrong, 1)]
     widest = max(cv2.getTextSize(line, cv2.FONT_HERSHEY_SIMPLEX, scale, thick)[0][0] for line in lines)
@@ -63,7 +61,7 @@ def _badge(
     colour: tuple[int, int, int],
     thick: int,
 ) -> None:
-    """A number beside a marking, joined to it."""
+    """Draw a number beside a marking, joined to it."""
     x, y = round(middle[0]), round(middle[1])
     up = -3 * pad if y > 5 * pad else 3 * pad
     cv2.line(picture, (x, y), (x, y + up), colour, thick, cv2.LINE_AA)
@@ -80,13 +78,13 @@ def _write(
 
 
 def worst(seen: Sequence[MarkingReport]) -> list[MarkingReport]:
-    """What something is wrong with: markings that are elsewhere by their offset, then others by what is missing."""
+    """Return the markings with something wrong: those elsewhere by their offset, then others by what is missing."""
     wrong = [one for one in seen if colour_of(one) != NEW_COLOUR]
     return sorted(wrong, key=lambda one: (not one.is_elsewhere, -abs(one.offset_m or 0.0) - one.expected_m))
 
 
 def _middles(pitch: Field, camera: Camera) -> Mapping[str, tuple[float, float]]:
-    """Where in the picture the middle of what is in view of each marking is."""
+    """Return the pixel in the middle of what is in view of each marking, by name."""
     lines, names = pitch.line_points(), pitch.whole_names()
     pixel = camera.project(lines.position)
     seen = inside(pixel, camera.intrinsics.size)

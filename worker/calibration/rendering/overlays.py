@@ -25,11 +25,10 @@ def overlay(
     legend_for: str = "pose",
     seen: Sequence[MarkingReport] = (),
 ) -> Frame:
-    """The frame with the markings on it: orange by the stored pose, blue by the new one, BGR like `frame`.
+    """Draw the markings on a frame: orange by the stored pose, blue by the new one, BGR like `frame`.
 
-    Each is drawn with the pitch it is for; `legend_for` says what is stored and new. `seen`: what is said of the
-    markings; those that are elsewhere, or hardly found, have colours of their own, and numbers of a list. What is
-    ignored is dark.
+    Each is drawn with the field it is for; `legend_for` says what is stored and new. `seen`: reports on the markings;
+    those that are elsewhere, or hardly found, have colours of their own, and numbers of a list. Ignored parts are dark.
 
     The stored pose draws the centre of each line; the new one frames it: the painted line stays visible between two
     blue ones if the pose is right.
@@ -55,7 +54,7 @@ def overlay(
 
 
 def candidate_picture(pitch: Field, camera: Camera, frame: Frame, name: str) -> Frame:
-    """The frame with the markings framed as a camera that was found puts them, BGR like `frame`."""
+    """Draw the markings on a frame, framed as a camera that was found puts them, BGR like `frame`."""
     picture = frame.copy()
     thickness = max(1, round(frame.shape[1] / 1600))
     for marking in pitch.markings():
@@ -66,7 +65,7 @@ def candidate_picture(pitch: Field, camera: Camera, frame: Frame, name: str) -> 
 
 
 def outline(marking: Marking) -> list[Array]:
-    """A marking's centre line and its edges, (n, 2) each, densely enough for distortion and roof."""
+    """Return a marking's centre line and its edges, (n, 2) each, densely enough for distortion and roof."""
     between, _ = resample(marking.centre, 0.25)
     centre = np.concatenate([marking.centre[:1], between, marking.centre[-1:]])
     if marking.spot:
@@ -81,7 +80,7 @@ def outline(marking: Marking) -> list[Array]:
 
 
 def frame_of(pitch: Field, camera: Camera, marking: Marking, gap: float) -> list[Array]:
-    """Both edges of a marking in a camera's pixels, (n, 2) each, moved `gap` outwards.
+    """Return both edges of a marking in a camera's pixels, (n, 2) each, moved `gap` outwards.
 
     Half a stroke and a little more, and the paint stays visible between two strokes.
     """

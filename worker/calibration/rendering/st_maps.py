@@ -15,14 +15,12 @@ from worker.calibration.geometry.camera import Array
 from worker.calibration.geometry.lens import Lens
 
 StMap = NDArray[np.float32]
-# Of pixels that nothing is behind: outside of every picture, and no NaN, which compositors spread.
+# Value of pixels that nothing is behind: outside of every picture, and no NaN, which compositors spread.
 NOWHERE = -1.0
-# Rows at a time: memory is bounded by the stripe, not by the picture.
-STRIPE = 64
 
 
 def undistorting(lens: Lens) -> StMap:
-    """Per pixel of the picture without distortion, where to sample the frame: (height, width, 2), see `_st_map`."""
+    """Return, per pixel of the picture without distortion, where to sample the frame (H, W, 2); see `_st_map`."""
     inverse = np.linalg.inv(lens.matrix)
 
     def sample(pixels: Array) -> Array:
@@ -32,7 +30,7 @@ def undistorting(lens: Lens) -> StMap:
 
 
 def distorting(lens: Lens) -> StMap:
-    """Per pixel of the frame, where to sample the picture without distortion: (height, width, 2), see `_st_map`."""
+    """Return, per pixel of the frame, where to sample the undistorted picture (H, W, 2); see `_st_map`."""
 
     def sample(pixels: Array) -> Array:
         return _linear(lens.matrix, lens.undistort(pixels))
@@ -41,19 +39,21 @@ def distorting(lens: Lens) -> StMap:
 
 
 def _st_map(size: tuple[int, int], sample: Callable[[Array], Array]) -> StMap:
-    """(x + 0.5) / width and (y + 0.5) / height of the pixel to sample: 0..1 from the outer corner at the top left.
+    """Return (x + 0.5) / width and (y + 0.5) / height of the pixel to sample: 0..1 from the top left corner.
 
     Pixel centres are at integers, as everywhere in the engine.
     """
     width, height = size
     found = np.empty((height, width, 2), np.float32)
-    for top in range(0, height, STRIPE):
-        rows = np.arange(top, min(top + STRIPE, height))
+    # Rows at a time: memory is bounded by the stripe, not by the picture.
+    stripe = 64
+    for top in range(0, height, stripe):
+        rows = np.arange(top, min(top + stripe, height))
         pixels = np.stack(np.meshgrid(np.arange(width), rows), axis=-1).astype(float)
         found[rows] = np.nan_to_num((sample(pixels) + 0.5) / [width, height], nan=NOWHERE)
     return found
 
 
 def _linear(matrix: NDArray[np.floating[Any]], points: Array) -> Array:
-    """Points (..., 2) through an upper triangular matrix (3, 3) with last row 0, 0, 1."""
+    """Map points (..., 2) by an upper triangular matrix (3, 3) with last row 0, 0, 1."""
     return points @ matrix[:2, :2].T + matrix[:2, 2]

@@ -16,14 +16,12 @@ from worker.calibration.stitching.photometric_alignment import evened_out
 from worker.calibration.stitching.photometry import Light
 from worker.calibration.stitching.views import StitchedView, ViewFromAbove
 
-# Least length of the pitch in the bird's-eye view, in pixels: courts are small.
-BIRDSEYE_LENGTH = 800
 NOT_KNOWN: Mapping[str, Light] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
 class Stitched:
-    """A view stitched from all cameras, BGR (H, W, 3); `owner` (H, W): number of the camera that counts most, or -1."""
+    """Picture stitched from all cameras, BGR (H, W, 3); `owner` (H, W): camera that counts most, or -1."""
 
     picture: Frame
     owner: NDArray[np.int8]
@@ -36,10 +34,10 @@ def stitched(
     frames: Mapping[str, Frame],
     evened: Mapping[str, Light] = NOT_KNOWN,
 ) -> Stitched:
-    """What the cameras see, from one place: pictures of two sets of poses from the same place can be compared.
+    """Stitch the frames into one view: pictures of two sets of poses from the same place can be compared.
 
-    `frames[camera.id]`: BGR (height, width, 3) of the size of the camera's intrinsics. `evened`: how by camera; without
-    any, as these frames say.
+    `frames[camera.id]`: BGR (height, width, 3) of the size of the camera's intrinsics. `evened`: corrections by camera;
+    without any, as these frames say.
     """
     made = _made(pitch, view, cameras, frames, evened)
     return Stitched(made.picture(frames), made.owner)
@@ -53,12 +51,12 @@ def birdseye(
     margin_m: float = 3,
     evened: Mapping[str, Light] = NOT_KNOWN,
 ) -> Frame:
-    """The pitch from straight above, BGR: x to the right, y up, the pitch centre in the centre pixel.
+    """Draw the field from straight above, BGR: x to the right, y up, the field's centre in the centre pixel.
 
-    `pixels_per_metre`: unless said 10, and more where the pitch would come out shorter than `BIRDSEYE_LENGTH`.
+    `pixels_per_metre`: unless said 10, and more where the field would come out shorter than 800 pixels.
     `frames[camera.id]`: BGR (height, width, 3) of the size of the camera's intrinsics.
     """
-    pixels_per_metre = pixels_per_metre or max(10.0, BIRDSEYE_LENGTH / pitch.length)
+    pixels_per_metre = pixels_per_metre or max(10.0, 800 / pitch.length)
     columns = round((pitch.length / 2 + margin_m) * pixels_per_metre)
     rows = round((pitch.width / 2 + margin_m) * pixels_per_metre)
     view = ViewFromAbove(1 / pixels_per_metre, (2 * columns + 1, 2 * rows + 1))
@@ -72,6 +70,6 @@ def _made(
     frames: Mapping[str, Frame],
     evened: Mapping[str, Light],
 ) -> Panorama:
-    """With seams in the middle between cameras, where wrong poses show, and not where they would be seen least."""
+    """Return the panorama with seams in the middle between cameras, where wrong poses show."""
     lights = evened or evened_out(pitch, cameras, frames)
     return panorama(pitch, view, cameras, {camera: replace(light, reach=0.0) for camera, light in lights.items()})

@@ -1,1 +1,1 @@
-"""From stored poses to ones near the truth: what a pose is worth, and the evolution that looks for the best."""
+"""Search from stored poses to ones near the truth: an objective for poses, and an evolution strategy."""

@@ -16,18 +16,18 @@ Schedule = Callable[[int], float]
 
 
 def exponential_decay(factor: float = 0.95) -> Schedule:
-    """Mutation strength factor^g in generation g: the paper's s_decay."""
+    """Return the schedule factor^g of the mutation strength in generation g: the paper's s_decay."""
     return lambda generation: factor**generation
 
 
 def blend(first: Array, second: Array, rng: np.random.Generator) -> Array:
-    """Children between two parents (n, genes) each, gene by gene with a share drawn from U(0, 1)."""
+    """Return children between two parents (n, genes) each, gene by gene with a share drawn from U(0, 1)."""
     share = rng.uniform(size=first.shape)
     return share * first + (1 - share) * second
 
 
 class EvolutionStrategy:
-    """Ask for children, tell their losses; the best `parents` of parents and children go on.
+    """Evolution strategy: ask for children, tell their losses; the best `parents` of parents and children go on.
 
     `mutation` (genes,) is the standard deviation of a child's mutation at schedule strength 1.
     """
@@ -41,13 +41,13 @@ class EvolutionStrategy:
         self.losses = np.empty(0)
 
     def first_parents(self, centre: Array, strength: float = 1.0) -> Array:
-        """The first generation (parents, genes): copies of `centre` (genes,) mutated, the first one left as it is."""
+        """Return the first generation (parents, genes): `centre` (genes,), and mutated copies of it."""
         genomes = centre + strength * self.mutation * self.rng.normal(size=(self.parents, len(centre)))
         genomes[0] = centre
         return genomes
 
     def ask(self, strength: float) -> Array:
-        """Children (offspring, genes) of the present population, mutated with `strength`."""
+        """Return children (offspring, genes) of the present population, mutated with `strength`."""
         drawn = self.rng.integers(len(self.population), size=(2, self.offspring))
         children = blend(self.population[drawn[0]], self.population[drawn[1]], self.rng)
         return children + strength * self.mutation * self.rng.normal(size=children.shape)
@@ -61,10 +61,10 @@ class EvolutionStrategy:
 
     @property
     def best(self) -> Array:
-        """The genome (genes,) of lowest loss so far."""
+        """Genome (genes,) of lowest loss so far."""
         return self.population[0]
 
     @property
     def best_loss(self) -> float:
-        """Its loss."""
+        """Lowest loss so far."""
         return float(self.losses[0])

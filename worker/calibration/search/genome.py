@@ -1,4 +1,4 @@
-"""Poses as vectors of numbers that can be mutated and mixed: per camera a rotation vector and a place."""
+"""Genomes: poses as vectors that can be mutated and mixed, per camera a rotation vector and a position."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ import numpy as np
 from worker.calibration.geometry.camera import Array, Camera, Pose
 
 GENES = 6
-"""Numbers per camera."""
+"""Number of genes per camera."""
 
 
 def genome_of(cameras: Sequence[Camera]) -> Array:
-    """Poses as one vector (6 N,): per camera rotation vector, position."""
+    """Return poses as one vector (6 N,): per camera rotation vector, position."""
     return np.concatenate([[*camera.pose.rotation, *camera.pose.position] for camera in cameras])
 
 
 def with_genome(cameras: Sequence[Camera], genome: Array) -> list[Camera]:
-    """The cameras at the poses of a genome (6 N,)."""
+    """Return the cameras at the poses of a genome (6 N,)."""
     poses = genome.reshape(-1, GENES)
     return [camera.with_pose(Pose(pose[:3], pose[3:])) for camera, pose in zip(cameras, poses, strict=True)]

@@ -1,12 +1,12 @@
-"""What a pose is worth: the coarse-to-fine objective, in image space.
+"""Objective of a pose search: coarse to fine, in image space.
 
 The paper warps segmentations to a bird's-eye grid and compares them with a template there, which gives the far half of
 the pitch (mostly noise) as much say as the near one. Here points on the markings are projected into the segmentation
 and read there. Three properties keep a pose from gaming it:
 
-- the points that count are chosen by the poses a level starts from, so turning away from hard lines does not help;
-- the segmentation is band-passed (blurred minus blurred more), so a response beside a line costs what one on it earns;
-- a point earns at most the height that its line has after the blur, so thick false alarms earn no more than a line.
+- the points that count are chosen by the poses a level starts from, so turning away from hard lines does not help; -
+the segmentation is band-passed (blurred minus blurred more), so a response beside a line costs what one on it earns; -
+a point earns at most the height that its line has after the blur, so thick false alarms earn no more than a line.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ from worker.calibration.geometry.visibility import VisibleLines
 Response = NDArray[np.float32]
 
 SURROUND = 3.0
-"""Width of the surround that is taken off a blurred response, in units of the blur."""
+"""Width of the surround that is subtracted from a blurred response, in units of the blur."""
 
 
 @dataclass(frozen=True)
 class Objective:
-    """The loss of whole populations of poses of a camera at one level of blur: the paper's L_single, in image space.
+    """Loss of whole populations of poses of a camera at one level of blur: the paper's L_single, in image space.
 
     How much of its expected markings the camera's segmentation lacks. The paper's L_stitch has no part in it: what
     cameras know of each other is weighed by the refinement, to a hundredth of a pixel.
@@ -76,7 +76,7 @@ class Objective:
 
 @dataclass(frozen=True)
 class BlurredResponse:
-    """A segmentation blurred and stored at 1/`shrink` of its size; zero outside."""
+    """Segmentation blurred and stored at 1/`shrink` of its size; zero outside."""
 
     values: Response
     shrink: int
@@ -96,7 +96,7 @@ class BlurredResponse:
         return cls(np.asarray(blurred, dtype=np.float32), shrink)
 
     def minus(self, coarser: BlurredResponse) -> BlurredResponse:
-        """The difference to a coarser blur of the same picture."""
+        """Return the difference to a coarser blur of the same picture."""
         finer = coarser.shrink // self.shrink
         height, width = self.values.shape
         # Both were padded to whole pixels of their own size: only their upper left corners coincide.
@@ -106,7 +106,7 @@ class BlurredResponse:
         return BlurredResponse(np.asarray(difference, dtype=np.float32), self.shrink)
 
     def at(self, column: Plane, row: Plane) -> Response:
-        """Values (P, N) at pixels of the full-size picture; 0 outside it and at NaN."""
+        """Return values (P, N) at pixels of the full-size picture; 0 outside it and at NaN."""
         if self.shrink == 1:
             return bilinear_planes(self.values, column, row)
         return bilinear_planes(self.values, (column + 0.5) / self.shrink - 0.5, (row + 0.5) / self.shrink - 0.5)

@@ -18,13 +18,13 @@ from worker.calibration.search.objective import Objective
 MUTATION_RAD = 0.005
 MUTATION_M = 0.1
 DECAY = 0.95
-PATIENCE, STALLED_BY = 6, 1e-5
-"""The search for a camera on a level ends when its best loss fell by less than this in so many generations."""
+PATIENCE = 6
+"""Least decrease of the best loss over `PATIENCE` generations for the search on a level to go on."""
 
 
 @dataclass(frozen=True)
 class Level:
-    """A stretch of generations at one blur (px of a 4K frame), and the strength of mutation at its start."""
+    """Stretch of generations at one blur (px of a 4K frame), and the strength of mutation at its start."""
 
     blur_px: float
     mutation: float
@@ -36,7 +36,7 @@ COARSE_TO_FINE = (Level(48, 4), Level(16, 1.5), Level(6, 0.5))
 
 @dataclass(frozen=True)
 class Strategy:
-    """The numbers of the paper's strategy: mu parents, lambda offspring, and G generations in all."""
+    """Parameters of the paper's strategy: mu parents, lambda offspring, and G generations in all."""
 
     parents: int
     offspring: int
@@ -45,7 +45,7 @@ class Strategy:
 
 @dataclass(frozen=True)
 class Found:
-    """Where the search ended: the best poses, the mean of their losses, and the generations that it took."""
+    """Result of the search: the best poses, the mean of their losses, and the number of generations."""
 
     cameras: list[Camera]
     loss: float
@@ -122,7 +122,7 @@ class _CameraSearch:
     def has_stalled(self) -> bool:
         """True if the last of the best losses is hardly below that of `PATIENCE` generations before."""
         best = self.best_losses
-        return len(best) > PATIENCE and best[-1 - PATIENCE] - best[-1] < STALLED_BY
+        return len(best) > PATIENCE and best[-1 - PATIENCE] - best[-1] < 1e-5
 
     def _judge(self, genomes: Array) -> None:
         self._evolution.tell(genomes, self._objective.losses(genomes))

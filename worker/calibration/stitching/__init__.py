@@ -1,1 +1,1 @@
-"""The stitched view: what it shows, where each of its pixels lies in the frames, and how frames become one picture."""
+"""Stitching: the view, the place of each of its pixels in the frames, and the picture of several frames."""

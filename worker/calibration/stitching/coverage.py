@@ -1,4 +1,4 @@
-"""What of a stitched view no camera sees."""
+"""Part of a stitched view that no camera sees."""
 
 from __future__ import annotations
 
@@ -14,8 +14,6 @@ NINTHS = (
     ("left", "middle", "right"),
     ("bottom left", "bottom", "bottom right"),
 )
-# A ninth is named if so much of what is unseen lies in it.
-LEAST_OF_UNSEEN = 0.15
 
 
 @dataclass(frozen=True)
@@ -27,12 +25,12 @@ class Unseen:
 
 
 def unseen_part(seen: NDArray[np.bool_]) -> Unseen:
-    """What of a view is unseen, by where it is `seen` (H, W)."""
+    """Return the unseen part of a view, by where it is `seen` (H, W)."""
     counts = {
         name: np.count_nonzero(~cell)
         for names, band in zip(NINTHS, np.array_split(seen, 3), strict=True)
         for name, cell in zip(names, np.array_split(band, 3, axis=1), strict=True)
     }
     total = sum(counts.values())
-    told = [name for name in sorted(counts, key=lambda name: -counts[name]) if counts[name] > LEAST_OF_UNSEEN * total]
-    return Unseen(total / seen.size, told)
+    places = [name for name in sorted(counts, key=lambda name: -counts[name]) if counts[name] > 0.15 * total]
+    return Unseen(total / seen.size, places)

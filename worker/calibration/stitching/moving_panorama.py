@@ -19,31 +19,29 @@ from worker.calibration.stitching.panorama import Contribution, Panorama, every_
 from worker.calibration.stitching.photometry import Light
 from worker.calibration.stitching.views import StitchedView
 
-MOTION_COLUMNS = 320
-"""The motion is computed at about so many places across the view; the tests hold it below 0.05 px for a degree."""
 STILL_BORDER = 0.02
-"""Of the width of a frame: what lies nearer to its border comes and goes with the shaking, and is not shown."""
+"""Margin of a frame, in its widths, that is not shown, as it comes and goes with the shaking."""
 VIEW_BORDER = 0.025
-"""Of the width of a frame: a view that ends so far inside has no holes, also where stored poses are a little off."""
-FILLED = 3
-"""So many rounds carry motion to places that the lens model does not cover, for the pixels beside them."""
+"""Margin, in widths of a frame, inside which a view ends without holes, also where stored poses are a little off."""
 
 
 class MovingPanorama:
-    """The view and its parts where `cameras` are the references of a clip; `at` is the panorama of other moments."""
+    """Panorama of a view by `cameras`, the references of a clip; `at` is that of other moments."""
 
     def __init__(
         self, pitch: Field, view: StitchedView, cameras: Sequence[Camera], lights: Mapping[str, Light] | None = None
     ) -> None:
         still = panorama(pitch, view, cameras, lights)
         self._still = Panorama(still.size, _within_frames(still.parts, still.seen, STILL_BORDER))
-        self._step = max(1, view.size[0] // MOTION_COLUMNS)
+        # Approximate number of places across the view at which the motion is computed; the tests hold its error below
+        # 0.05 px for a degree.
+        self._step = max(1, view.size[0] // 320)
         self._points = view.behind(pitch, every_nth_pixel(view.size, self._step))
         self._before = [camera.project(self._points) for camera in cameras]
         self._used = [_used(part, self._step) for part in self._still.parts]
 
     def at(self, cameras: Sequence[Camera]) -> Panorama:
-        """The panorama where the same cameras, in the same order, are elsewhere by a degree or two."""
+        """Return the panorama where the same cameras, in the same order, have moved by a degree or two."""
         motions = [
             _filled((camera.project(self._points) - before).astype(np.float32))
             for before, camera in zip(self._before, cameras, strict=True)
@@ -62,7 +60,7 @@ class MovingPanorama:
 
 
 def _within_frames(parts: Sequence[Contribution], seen: NDArray[np.bool_], margin: float) -> list[Contribution]:
-    """The parts without what lies outside of their frames, or nearer to the border than `margin` (of the width).
+    """Return the parts without what lies outside of their frames, or nearer to the border than `margin` (of the width).
 
     Weights sum to 1 again where it was `seen` (H, W) before, wherever a camera is left that sees it.
     """
@@ -76,7 +74,7 @@ def _within_frames(parts: Sequence[Contribution], seen: NDArray[np.bool_], margi
 
 
 def _used(part: Contribution, step: int) -> NDArray[np.bool_]:
-    """Which of `every_nth_pixel` (h, w) have to do with pixels where a camera counts."""
+    """True for those of `every_nth_pixel` (h, w) that have to do with pixels where a camera counts."""
     reach = cv2.dilate((part.weight > 0).astype(np.uint8), np.ones((2 * step + 1, 2 * step + 1), np.uint8))
     height, width = part.weight.shape
     column, row = (
@@ -87,9 +85,9 @@ def _used(part: Contribution, step: int) -> NDArray[np.bool_]:
 
 
 def _filled(motion: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Motion (h, w, 2) with means of the neighbours where it is NaN, and none farther off."""
+    """Return motion (h, w, 2) with means of the neighbours where it is NaN, and none farther off."""
     known = np.asarray(np.isfinite(motion).all(axis=-1))
-    for _ in range(FILLED):
+    for _ in range(3):
         if known.all():
             break
         weight = cv2.blur(known.astype(np.float32), (3, 3))

@@ -1,4 +1,4 @@
-"""Where each pixel of a stitched view lies in the frames, how much each camera counts there, and the picture of it.
+"""Panorama: the place of each pixel of a stitched view in the frames, the weight of each camera there, and its picture.
 
 A panorama is geometry: it holds until a pose, a lens, the view or the light of a camera changes, and any number of
 frames go through it (`Panorama.picture`).
@@ -20,19 +20,15 @@ from worker.calibration.geometry.ground_view import box, quality, sampled
 from worker.calibration.stitching.photometry import NEUTRAL, Light
 from worker.calibration.stitching.views import StitchedView
 
-# What no camera sees: dark grey rather than black, so that it reads as "outside" and not as "broken".
+# Colour of what no camera sees: dark grey rather than black, so that it reads as "outside" and not as "broken".
 BACKDROP = 38
 # Geometry is computed at every n-th pixel and interpolated; the tests hold it below 0.05 px.
 GEOMETRY_STEP = 4
-# Power of how well a camera sees: a short feather, so that players who stand off the ground do not become ghosts.
-SHARPNESS = 60
-# Below this a camera does not count: less than half a grey level of a white pixel.
-LEAST_WEIGHT = 1 / 512
 
 
 @dataclass(frozen=True)
 class Contribution:
-    """What one camera gives to a view of (H, W) pixels.
+    """Contribution of one camera to a view of (H, W) pixels.
 
     `weight` (H, W): how much it counts, 0 to 1; `source` (H, W, 2): the pixel x, y of its frame (centres at integers),
     anything where it does not count.
@@ -46,11 +42,11 @@ class Contribution:
 
     @property
     def rise(self) -> NDArray[np.float32]:
-        """By what its pixels are multiplied for what its lens takes from the corners, (H, W)."""
+        """Factor (H, W) on its pixels for what its lens takes from the corners."""
         return self.light.rise(self.source, self.frame_size)
 
     def values(self, frame: Frame, around: tuple[slice, slice]) -> NDArray[np.float32]:
-        """Its colours (h, w, 3) in rows and columns of the view, evened out with the other cameras'."""
+        """Return the camera's colours (h, w, 3) in rows and columns of the view, evened out with the other cameras'."""
         source = self.source[around]
         raw = sampled(frame, source, self.weight[around] > 0)
         toned = cv2.LUT(raw, self.light.tones[:, None, :])
@@ -59,14 +55,14 @@ class Contribution:
 
 @dataclass(frozen=True)
 class Panorama:
-    """A stitched view of `size` (width, height): its parts, whose weights sum to 1 where any camera sees."""
+    """Stitched view of `size` (width, height): its parts, whose weights sum to 1 where any camera sees."""
 
     size: tuple[int, int]
     parts: Sequence[Contribution]
 
     @property
     def seen(self) -> NDArray[np.bool_]:
-        """Where any camera sees, (H, W)."""
+        """Mask (H, W) of pixels that any camera sees."""
         return np.any([part.weight > 0 for part in self.parts], axis=0)
 
     @property
@@ -76,7 +72,7 @@ class Panorama:
         return np.where(self.seen, best, -1).astype(np.int8)
 
     def picture(self, frames: Mapping[str, Frame]) -> Frame:
-        """The view (H, W, 3) of one frame of each camera, blue, green, red, each of the size of its camera's frames."""
+        """Return the view (H, W, 3), BGR, of one frame of each camera, of the size of its camera's frames."""
         width, height = self.size
         total = np.full((height, width, 3), BACKDROP, np.float32)
         total[self.seen] = 0
@@ -93,7 +89,7 @@ class Panorama:
 def panorama(
     pitch: Field, view: StitchedView, cameras: Sequence[Camera], lights: Mapping[str, Light] | None = None
 ) -> Panorama:
-    """How the cameras' frames become one view. `lights` by camera; a camera that has none is taken as it is."""
+    """Return the panorama of the cameras. `lights` by camera; a camera that has none is taken as it is."""
     lights = lights or {}
     points = view.behind(pitch, every_nth_pixel(view.size))
     pixels = [camera.project(points) for camera in cameras]
@@ -121,22 +117,24 @@ def panorama(
 
 
 def seam_weights(qualities: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Weights (cameras, H, W) that sum to 1 where any camera sees, from how well each does: the best one, feathered."""
-    relative = (qualities / np.maximum(qualities.max(axis=0), 1e-30)) ** SHARPNESS
+    """Return weights (cameras, H, W) that sum to 1 where any camera sees: the best one's, feathered."""
+    # Power of how well a camera sees: a short feather, so that players who stand off the ground do not become ghosts.
+    relative = (qualities / np.maximum(qualities.max(axis=0), 1e-30)) ** 60
     relative /= np.maximum(relative.sum(axis=0), 1e-30)
-    relative[relative < LEAST_WEIGHT] = 0
+    # Below this a camera does not count: less than half a grey level of a white pixel.
+    relative[relative < (1 / 512)] = 0
     weights: NDArray[np.float32] = relative / np.maximum(relative.sum(axis=0), 1e-30)
     return weights
 
 
 def every_nth_pixel(size: tuple[int, int], step: int = GEOMETRY_STEP) -> Array:
-    """Positions (h, w, 2) of the centres of blocks of `step` pixels, one block more on each side."""
+    """Return positions (h, w, 2) of the centres of blocks of `step` pixels, one block more on each side."""
     x, y = (step * (np.arange(-1, -(-extent // step) + 1) + 0.5) - 0.5 for extent in size)
     return np.stack(np.meshgrid(x, y), axis=-1)
 
 
 def every_pixel(values: NDArray[Any], size: tuple[int, int], step: int = GEOMETRY_STEP) -> NDArray[np.float32]:
-    """Values (h, w[, 2]) at `every_nth_pixel`, linearly interpolated to every pixel (height, width[, 2])."""
+    """Interpolate values (h, w[, 2]) at `every_nth_pixel` linearly to every pixel (height, width[, 2])."""
     width, height = size
     fine = cv2.resize(values.astype(np.float32), None, fx=step, fy=step, interpolation=cv2.INTER_LINEAR)
     dense = np.asarray(fine, np.float32)

@@ -1,4 +1,4 @@
-"""What makes cameras agree in a stitched view, from what they show of the same places, and where its seams are best."""
+"""Photometric alignment of cameras in a stitched view by the places that several of them show, and its best seams."""
 
 from __future__ import annotations
 
@@ -17,34 +17,15 @@ from worker.calibration.geometry.ground_view import quality, sampled
 from worker.calibration.stitching.photometry import MIDDLE, Light, squared_radius
 from worker.calibration.stitching.views import ViewChoice, chosen_view
 
-# Cameras are compared in a view of this width, smoothed: neither noise nor the edges of what stands off the ground.
-COMPARED_WIDTH, SMOOTHED_PX = 480, 2.0
 # Values this dark or bright say nothing about exposure.
 EXPOSED = (16, 240)
-# Fewer places than this that two cameras see say nothing.
-LEAST_PLACES = 100
-# Logarithms. What is left between two cameras at a place, and how many places of a pair are as good as independent.
-NOISE, INDEPENDENT = 0.05, 20
-# How far log gains, contrasts and falloffs are expected from 0: cameras of one rig are alike.
-GAIN_SIGMA, CONTRAST_SIGMA, FALLOFF_SIGMA = 0.3, 0.1, 0.1
-# Beyond this it is no matter of exposure.
-LARGEST_GAIN, LARGEST_CONTRAST, LARGEST_FALLOFF = 1.5, 0.3, 0.4
-ROUNDS = 12
+# A larger gain is no matter of exposure.
+LARGEST_GAIN = 1.5
 UNKNOWNS = 5
-# Residuals beyond so many of their own scales are players, and what else two cameras see differently.
-ROBUST = 2.0
-# Seams are tried at these log ratios of how well two cameras see, over a band as wide, and one is worth moving for a
-# difference that grows with its square: most of both pictures is left where it is seen best.
-SEAMS, BAND = np.linspace(-1.5, 1.5, 31), 0.2
-HOLD = 0.005
-# Log differences above this are all alike: somebody stands there.
-OUTRIGHT = 0.7
-# How far reaches are expected from 0, beside a seam that is known to `SEAM_SIGMA`.
-REACH_SIGMA, SEAM_SIGMA = 1.0, 0.2
 
 
 def evened_out(pitch: Field, cameras: Sequence[Camera], frames: Mapping[str, Frame]) -> dict[str, Light]:
-    """What makes the cameras agree where they overlap, by camera; none of one that overlaps no other.
+    """Return the corrections that make the cameras agree where they overlap, by camera, if it overlaps any.
 
     Least squares of the logarithms of what two cameras show of the same places, robust to players and to whatever
     stands off the ground; held near no correction at all, so that only differences follow the pictures. The seams then
@@ -52,16 +33,17 @@ def evened_out(pitch: Field, cameras: Sequence[Camera], frames: Mapping[str, Fra
     """
     if len(cameras) < 2:
         return {}
-    view = chosen_view(pitch, cameras, ViewChoice(width=COMPARED_WIDTH))
+    view = chosen_view(pitch, cameras, ViewChoice(width=480))
     width, height = view.size
     points = view.behind(pitch, np.stack(np.meshgrid(np.arange(width), np.arange(height)), axis=-1).astype(float))
     seen = [_seen(camera, frames[camera.id], points) for camera in cameras]
+    # Fewer places than this that two cameras see say nothing.
     overlaps = [
         _Overlap.of(i, j, seen)
         for i, j in combinations(range(len(cameras)), 2)
-        if np.count_nonzero(seen[i].valid & seen[j].valid) >= LEAST_PLACES
+        if np.count_nonzero(seen[i].valid & seen[j].valid) >= 100
     ]
-    limits = np.array([*3 * [math.log(LARGEST_GAIN)], LARGEST_CONTRAST, LARGEST_FALLOFF])
+    limits = np.array([*3 * [math.log(LARGEST_GAIN)], 0.3, 0.4])
     numbers = np.clip(_solved(overlaps, len(cameras)), -limits, limits)
     reaches = _reaches(overlaps, seen, numbers)
     overlapping = sorted({n for overlap in overlaps for n in overlap.cameras})
@@ -70,9 +52,7 @@ def evened_out(pitch: Field, cameras: Sequence[Camera], frames: Mapping[str, Fra
 
 @dataclass(frozen=True)
 class _Seen:
-    """What a camera shows of places (H, W): logarithms (H, W, 3), where it does, squared distances from the middle of
-    its frame, and how well it sees there.
-    """
+    """Logarithms (H, W, 3) of places by a camera, where valid; squared distances from the middle; how well it sees."""
 
     logs: NDArray[np.float32]
     valid: NDArray[np.bool_]
@@ -80,7 +60,7 @@ class _Seen:
     quality: NDArray[np.float32]
 
     def evened(self, numbers: Array) -> Array:
-        """The logarithms with log gains, contrast and falloff (5,) applied."""
+        """Return the logarithms with log gains, contrast and falloff (5,) applied."""
         changed = self.logs + numbers[:3] + numbers[3] * (self.logs - math.log(MIDDLE))
         return np.asarray(changed + numbers[4] * self.radius[..., None], float)
 
@@ -91,13 +71,15 @@ def _seen(camera: Camera, frame: Frame, points: Array) -> _Seen:
     within = inside(pixels, size)
     values = sampled(frame, pixels, within).astype(np.float32)
     exposed = within & (values.min(axis=-1) > EXPOSED[0]) & (values.max(axis=-1) < EXPOSED[1])
+    # Neither noise nor the edges of what stands off the ground.
+    smoothed_px = 2.0
     share, total = (
-        cv2.GaussianBlur(part, (0, 0), SMOOTHED_PX)
+        cv2.GaussianBlur(part, (0, 0), smoothed_px)
         for part in (exposed.astype(np.float32), np.where(exposed[..., None], np.log(np.maximum(values, 1)), 0))
     )
     logs: NDArray[np.float32] = (np.asarray(total) / np.maximum(np.asarray(share), 1e-6)[..., None]).astype(np.float32)
     radius = squared_radius(np.nan_to_num(pixels).astype(np.float32), size)
-    every = slice(None, None, round(SMOOTHED_PX))
+    every = slice(None, None, round(smoothed_px))
     valid = exposed & (np.asarray(share) > 0.5)
     sees = quality(size, pixels)
     return _Seen(logs[every, every], valid[every, every], radius[every, every], sees[every, every])
@@ -105,7 +87,7 @@ def _seen(camera: Camera, frame: Frame, points: Array) -> _Seen:
 
 @dataclass(frozen=True)
 class _Overlap:
-    """What two cameras say of each other: `design` (n, 10) times the numbers of both should be `difference` (n,).
+    """Equations of two cameras: `design` (n, 10) times the parameters of both should be `difference` (n,).
 
     A row for each colour of each place; log gains of blue, green and red, contrast and falloff of either.
     """
@@ -116,7 +98,7 @@ class _Overlap:
 
     @classmethod
     def of(cls, i: int, j: int, seen: Sequence[_Seen]) -> _Overlap:
-        """Of cameras number i and j."""
+        """Return the equations of cameras number i and j."""
         both = seen[i].valid & seen[j].valid
         design = np.zeros((np.count_nonzero(both), 3, 2, UNKNOWNS))
         for side, (camera, sign) in enumerate(((i, 1), (j, -1))):
@@ -129,22 +111,25 @@ class _Overlap:
 
     @property
     def columns(self) -> NDArray[np.intp]:
-        """Where its unknowns are among those of all cameras."""
+        """Indices of its unknowns among those of all cameras."""
         return np.concatenate([UNKNOWNS * n + np.arange(UNKNOWNS) for n in self.cameras])
 
 
 def _solved(overlaps: Sequence[_Overlap], count: int) -> Array:
-    """Log gains of blue, green and red, contrast and falloff of each camera, (count, 5)."""
-    sigma = np.tile([*3 * [GAIN_SIGMA], CONTRAST_SIGMA, FALLOFF_SIGMA], count)
+    """Return log gains of blue, green and red, contrast and falloff of each camera, (count, 5)."""
+    # Cameras of one rig are alike.
+    sigma = np.tile([*3 * [0.3], 0.1, 0.1], count)
     solution: Array = np.zeros(UNKNOWNS * count)
-    for _ in range(ROUNDS):
+    for _ in range(12):
         normal, right = np.diag(1 / np.square(sigma)).astype(float), np.zeros(UNKNOWNS * count)
         for overlap in overlaps:
             columns, design = overlap.columns, overlap.design
             residual = overlap.difference - design @ solution[columns]
             scale = max(1.4826 * float(np.median(np.abs(residual))), 1e-3)
-            weight = 1 / np.maximum(1, np.abs(residual) / (ROBUST * scale)) ** 2
-            weight *= INDEPENDENT / NOISE**2 / weight.sum()
+            # Residuals beyond so many of their own scales are players, and what else two cameras see differently.
+            weight = 1 / np.maximum(1, np.abs(residual) / (2.0 * scale)) ** 2
+            # So many places of a pair are as good as independent.
+            weight *= 20 / 0.05**2 / weight.sum()
             normal[np.ix_(columns, columns)] += design.T @ (weight[:, None] * design)
             right[columns] += design.T @ (weight * overlap.difference)
         solution = np.asarray(np.linalg.solve(normal, right), float)
@@ -152,25 +137,32 @@ def _solved(overlaps: Sequence[_Overlap], count: int) -> Array:
 
 
 def _reaches(overlaps: Sequence[_Overlap], seen: Sequence[_Seen], numbers: Array) -> Array:
-    """The reach of each camera that brings the seam of each pair to where the two differ least."""
-    normal, right = np.eye(len(seen)) / REACH_SIGMA**2, np.zeros(len(seen))
+    """Return the reach of each camera that brings the seam of each pair to where the two differ least."""
+    normal, right = np.eye(len(seen)), np.zeros(len(seen))
+    seam_sigma = 0.2
     for overlap in overlaps:
         i, j = overlap.cameras
         sign = np.zeros(len(seen))
         sign[[i, j]] = -1, 1
-        normal += np.outer(sign, sign) / SEAM_SIGMA**2
-        right += sign * _best_seam(seen[i], seen[j], numbers[i], numbers[j]) / SEAM_SIGMA**2
+        normal += np.outer(sign, sign) / seam_sigma**2
+        right += sign * _best_seam(seen[i], seen[j], numbers[i], numbers[j]) / seam_sigma**2
     return np.asarray(np.linalg.solve(normal, right), float)
 
 
 def _best_seam(first: _Seen, second: _Seen, by_first: Array, by_second: Array) -> float:
-    """The log ratio of how well two cameras see along which their evened pictures differ least."""
+    """Return the log ratio of how well two cameras see along which their evened pictures differ least."""
     both = first.valid & second.valid
     ratio = np.log(first.quality[both] / second.quality[both])
     apart = np.abs(first.evened(by_first) - second.evened(by_second)).mean(axis=-1)[both]
     costs = []
-    for seam in SEAMS:
-        along = np.abs(ratio - seam) < BAND
-        differing = np.minimum(apart[along], OUTRIGHT).mean() if along.any() else OUTRIGHT
-        costs.append(differing + HOLD * seam**2)
-    return float(SEAMS[np.argmin(costs)])
+    # Log ratios of how well two cameras see at which seams are tried.
+    seams = np.linspace(-1.5, 1.5, 31)
+    # Log differences above this are all alike: somebody stands there.
+    outright = 0.7
+    for seam in seams:
+        along = np.abs(ratio - seam) < 0.2
+        differing = np.minimum(apart[along], outright).mean() if along.any() else outright
+        # A seam is moved for a difference that grows with its square: most of both pictures is left where it is seen
+        # best.
+        costs.append(differing + 0.005 * seam**2)
+    return float(seams[np.argmin(costs)])

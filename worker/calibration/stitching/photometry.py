@@ -1,4 +1,4 @@
-"""How a camera's picture is evened out with the others': exposure, white balance, darker corners, and where it ends."""
+"""Photometric correction of a camera's picture: exposure, white balance, darker corners, and the place of its seam."""
 
 from __future__ import annotations
 
@@ -11,19 +11,17 @@ from worker.calibration.geometry.camera import Array
 
 # The grey level that a contrast leaves as it is.
 MIDDLE = 100.0
-# How much of a new estimate counts beside what was kept.
-NEW_SHARE = 0.25
 
 
 @dataclass(frozen=True)
 class Light:
-    """What is done to a camera's picture so that it agrees with the others'.
+    """Correction of a camera's picture, by which it agrees with the others'.
 
-    `gain`: by what a middling blue, green and red (`MIDDLE`) is multiplied. `contrast`: how much steeper its tones
-    become, an exponent less 1, since makers bend them differently. `falloff`: the logarithm of how much more the
-    corners are multiplied by than the middle; it rises with the square of the distance from the middle of the frame,
-    which stands for the optical axis. `reach`: the logarithm by which it counts more than how finely it sees; that
-    moves the seams between it and others.
+    `gain`: the factor on a middling blue, green and red (`MIDDLE`). `contrast`: how much steeper its tones become, an
+    exponent less 1, since makers bend them differently. `falloff`: the log ratio of the factors in the corners and in
+    the middle; it rises with the square of the distance from the middle of the frame, which stands for the optical
+    axis. `reach`: the logarithm by which it counts more than how finely it sees; that moves the seams between it and
+    others.
     """
 
     gain: tuple[float, float, float] = (1.0, 1.0, 1.0)
@@ -33,20 +31,20 @@ class Light:
 
     @property
     def tones(self) -> NDArray[np.float32]:
-        """What blue, green and red of each grey level 0 to 255 become in the middle of the frame, (256, 3)."""
+        """Blue, green and red (256, 3) for each grey level 0 to 255 in the middle of the frame."""
         tone = MIDDLE * (np.arange(256) / MIDDLE) ** (1 + self.contrast)
         return (tone[:, None] * np.array(self.gain)).astype(np.float32)
 
     def rise(self, pixels: NDArray[np.float32], size: tuple[int, int]) -> NDArray[np.float32]:
-        """By what pixels (..., 2) of a frame of `size` (width, height) are multiplied beside."""
+        """Return the further factor on pixels (..., 2) of a frame of `size` (width, height)."""
         return np.exp(np.float32(self.falloff) * squared_radius(pixels, size))
 
     def after(self, before: Light | None) -> Light:
-        """This one, steadied by the `before`: a cloud moves a picture by a part of what it moved the light."""
+        """Return the correction smoothed with the one `before`: a cloud moves only a part of it."""
         if before is None:
             return self
         old, new = before.numbers, self.numbers
-        return Light.of(old + NEW_SHARE * (new - old))
+        return Light.of(old + 0.25 * (new - old))
 
     @property
     def numbers(self) -> Array:
@@ -55,7 +53,7 @@ class Light:
 
     @classmethod
     def of(cls, numbers: Array) -> Light:
-        """From its `numbers`."""
+        """Return the correction of its `numbers`."""
         blue, green, red = np.exp(numbers[:3]).tolist()
         return cls((blue, green, red), *map(float, numbers[3:]))
 
@@ -64,7 +62,7 @@ NEUTRAL = Light()
 
 
 def squared_radius(pixels: NDArray[np.float32], size: tuple[int, int]) -> NDArray[np.float32]:
-    """Squares (...) of the distances of pixels (..., 2) from the middle of a frame, 1 in its corners."""
+    """Return squares (...) of the distances of pixels (..., 2) from the middle of a frame, 1 in its corners."""
     half = (np.array(size, np.float32) - 1) / 2
     offset = (pixels - half) / np.float32(np.hypot(*half))
     square: NDArray[np.float32] = np.sum(offset * offset, axis=-1)

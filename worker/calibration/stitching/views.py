@@ -1,4 +1,4 @@
-"""From where a stitched view is seen, and what of the world is behind its pixels."""
+"""Stitched views: virtual cameras, and the world behind their pixels."""
 
 from __future__ import annotations
 
@@ -16,32 +16,20 @@ from worker.calibration.geometry.rotation import rotation_matrices, rotation_vec
 Projection = Literal["pannini", "cylinder", "rectilinear", "birds-eye"]
 LevelProjection = Literal["pannini", "cylinder", "rectilinear"]
 
-# A view stands back where the cameras see the pitch further to the side than this, then until it has this.
-TOO_WIDE_DEG, STANDING_BACK_DEG = 80.0, 60.0
-# A view shows this much around the visible pitch, in widths and heights of it in the picture.
-AROUND_SIDES, AROUND_ABOVE, AROUND_BELOW = 0.03, 0.8, 0.15
-# Of the pitch from above, in metres.
-AROUND_PITCH_M = 3.0
-# Least and largest height of a view in widths.
-HEIGHT_TO_WIDTH = 0.15, 1.0
 # Widest field of view of each projection; beyond it the picture is mostly its own corners.
 WIDEST_DEG: dict[LevelProjection, float] = {"pannini": 270.0, "cylinder": 340.0, "rectilinear": 140.0}
-# Of a view that is panned away from all of the pitch.
-NOTHING_SEEN_DEG = 90.0
-# Where it stands, looks and ends is rounded (metres, degrees, parts of the focal length): a night's wind, which moves
-# cameras by millimetres, moves the view not at all, and no graphics that somebody laid over it.
+# Steps of a view's place, direction and window (metres, degrees, parts of the focal length): a night's wind, which
+# moves cameras by millimetres, moves the view not at all, and no graphics that somebody laid over it.
 STAND_STEP_M, AXIS_STEP_DEG, WINDOW_STEP = 0.25, 0.5, 0.02
-# "Infinity": far beyond any parallax between cameras, near enough for float64.
-FAR_M = 1e6
 
 
 @dataclass(frozen=True)
 class ViewChoice:
-    """What somebody wants to see; None: as it suits the cameras.
+    """Options of a view; None: as it suits the cameras.
 
     `field_of_view_deg`: from the left border to the right one. `pan_deg`: to the right of where the cameras look.
-    `horizon`: how far down in the picture the horizon lies, 0 at its top and 1 at its bottom; it may lie outside.
-    Of the view from above only projection and size count.
+    `horizon`: how far down in the picture the horizon lies, 0 at its top and 1 at its bottom; it may lie outside. For
+    the view from above only projection and size count.
     """
 
     projection: Projection = "pannini"
@@ -53,7 +41,7 @@ class ViewChoice:
 
 
 class StitchedView(Protocol):
-    """A virtual camera. Pixel centres are at integers."""
+    """Virtual camera. Pixel centres are at integers."""
 
     @property
     def size(self) -> tuple[int, int]:
@@ -61,16 +49,16 @@ class StitchedView(Protocol):
         ...
 
     def behind(self, pitch: Field, pixels: Array) -> Array:
-        """World points (H, W, 3) behind pixels (H, W, 2)."""
+        """Return world points (H, W, 3) behind pixels (H, W, 2)."""
         ...
 
     def project(self, points: Array) -> Array:
-        """World points (..., 3) to pixels (..., 2)."""
+        """Project world points (..., 3) to pixels (..., 2)."""
         ...
 
 
 def chosen_view(pitch: Field, cameras: Sequence[Camera], choice: ViewChoice, border: float = 0.0) -> StitchedView:
-    """The virtual camera that shows what is wanted of what the cameras see.
+    """Return the virtual camera of a choice for what the cameras see.
 
     `border`: what lies nearer than this to the border of a frame, in parts of its width, is taken as not seen.
     """
@@ -81,7 +69,7 @@ def chosen_view(pitch: Field, cameras: Sequence[Camera], choice: ViewChoice, bor
 
 @dataclass(frozen=True)
 class LevelView:
-    """A level virtual camera at `pose`; `focal` in pixels; its axis ends in pixel `principal`.
+    """Level virtual camera at `pose`; `focal` in pixels; its axis ends in pixel `principal`.
 
     Horizon and what is shown are chosen by the window alone, so that verticals stay upright in every projection.
     """
@@ -93,25 +81,26 @@ class LevelView:
     size: tuple[int, int]
 
     def rays(self, pixels: Array) -> Array:
-        """Directions in the world (..., 3) through pixels (..., 2)."""
+        """Return directions in the world (..., 3) through pixels (..., 2)."""
         x, y = np.moveaxis((pixels - np.array(self.principal)) / self.focal, -1, 0)
         return np.stack(_FROM_PLANE[self.projection](x, y), axis=-1) @ self.pose.matrix
 
     def project(self, points: Array) -> Array:
-        """World points (..., 3) to pixels (..., 2)."""
+        """Project world points (..., 3) to pixels (..., 2)."""
         right, down, ahead = np.moveaxis((points - self.pose.position) @ self.pose.matrix.T, -1, 0)
         on_plane = np.stack(_ONTO_PLANE[self.projection](right, down, ahead), axis=-1)
         return self.focal * on_plane + np.array(self.principal)
 
     def behind(self, pitch: Field, pixels: Array) -> Array:
-        """World points (H, W, 3) behind pixels (H, W, 2): on the pitch, the ground around it, or far away."""
+        """Return world points (H, W, 3) behind pixels (H, W, 2): on the field, the ground around it, or far away."""
         directions = self.rays(pixels)
         start = self.pose.position
         # Reciprocal distances pass through the horizon without a jump. The roof is so flat that a few steps from the
         # height last found reach it.
         height = np.zeros(directions.shape[:2])
         for _ in range(4):
-            reciprocal = np.maximum(-directions[..., 2] / (start[2] - height), 1 / FAR_M)
+            # "Infinity": far beyond any parallax between cameras, near enough for float64.
+            reciprocal = np.maximum(-directions[..., 2] / (start[2] - height), 1 / 1e6)
             points = start + directions / reciprocal[..., None]
             height = pitch.height(points[..., :2])
         return points
@@ -119,17 +108,17 @@ class LevelView:
 
 @dataclass(frozen=True)
 class ViewFromAbove:
-    """The pitch from straight above: x to the right, y up, the pitch centre in the middle of the picture."""
+    """View of the field from straight above: x to the right, y up, the field's centre in the middle of the picture."""
 
     metres_per_pixel: float
     size: tuple[int, int]
 
     def behind(self, pitch: Field, pixels: Array) -> Array:
-        """Points (H, W, 3) of the pitch and the ground around it."""
+        """Return points (H, W, 3) of the field and the ground around it."""
         return pitch.lift((pixels - self._middle) * [self.metres_per_pixel, -self.metres_per_pixel])
 
     def project(self, points: Array) -> Array:
-        """World points (..., 3) to pixels (..., 2)."""
+        """Project world points (..., 3) to pixels (..., 2)."""
         return points[..., :2] / [self.metres_per_pixel, -self.metres_per_pixel] + self._middle
 
     @property
@@ -182,8 +171,9 @@ _ONTO_PLANE: dict[LevelProjection, Callable[[Array, Array, Array], tuple[Array, 
 
 
 def _from_above(pitch: Field, choice: ViewChoice) -> ViewFromAbove:
-    """All of the pitch and a little around it, in a picture as wide as wanted, as high as wanted or as it needs."""
-    across, up = pitch.length + 2 * AROUND_PITCH_M, pitch.width + 2 * AROUND_PITCH_M
+    """Return the view of all of the field and a little around it, in the chosen size, or as high as it needs."""
+    margin_m = 3.0
+    across, up = pitch.length + 2 * margin_m, pitch.width + 2 * margin_m
     height = choice.height or _even(choice.width * up / across)
     return ViewFromAbove(max(across / choice.width, up / height), (choice.width, height))
 
@@ -191,11 +181,11 @@ def _from_above(pitch: Field, choice: ViewChoice) -> ViewFromAbove:
 def _level_view(
     pitch: Field, cameras: Sequence[Camera], choice: ViewChoice, projection: LevelProjection, border: float
 ) -> LevelView:
-    """From where the view is seen, and what part of it is shown.
+    """Return the level view of a choice: where it stands, and the window that it shows.
 
     It stands at the mean of the cameras' positions and looks along the mean of their lines of sight; where these cancel
-    (cameras that face each other) it looks across the pitch from the usual side. Where the visible pitch would lie
-    beside or behind it (cameras around the pitch) it stands further back and higher, so that the pitch is seen as
+    (cameras that face each other) it looks across the field from the usual side. Where the visible field would lie
+    beside or behind it (cameras around the field) it stands further back and higher, so that the field is seen as
     steeply as the cameras see it.
     """
     seen = [_visible_pitch(pitch, camera) for camera in cameras]
@@ -207,7 +197,7 @@ def _level_view(
     focal = choice.width / (right - left)
     if choice.height is None:
         # Poses that are far off make slivers; those are the ones somebody has to look at.
-        least, largest = np.array(HEIGHT_TO_WIDTH) * choice.width
+        least, largest = np.array([0.15, 1.0]) * choice.width
         height = _even(np.clip(focal * (bottom - top), least, largest))
     else:
         height = choice.height
@@ -217,25 +207,25 @@ def _level_view(
 
 
 def _even(pixels: float) -> int:
-    """A height next to what is needed: most video needs even ones."""
+    """Return an even height next to `pixels`: most video needs even ones."""
     return max(2, 2 * round(pixels / 2))
 
 
 def _panned(pose: Pose, pan_deg: float) -> Pose:
-    """The same, turned to the right about the vertical."""
+    """Return the pose turned to the right about the vertical."""
     about_vertical = rotation_matrices(np.array([0.0, 0.0, np.radians(pan_deg)]))
     return Pose(rotation_vectors(pose.matrix @ about_vertical), pose.position)
 
 
 def _borders(aim: LevelView, field_of_view_deg: float) -> tuple[float, float]:
-    """Where the left and right border lie in the picture plane."""
+    """Return the left and right border in the picture plane."""
     half = np.radians(min(field_of_view_deg, WIDEST_DEG[aim.projection])) / 2
     x, _ = _ONTO_PLANE[aim.projection](np.sin(half), np.zeros(()), np.cos(half))
     return -float(x), float(x)
 
 
 def _visible_pitch(pitch: Field, camera: Camera) -> Array:
-    """Points (K, 3), one every square metre, of the pitch in a camera's picture; all of them if it sees none."""
+    """Return points (K, 3), one every square metre, of the field in a camera's picture; all of them if it sees none."""
     grid = ground_grid(round(pitch.length / 2), round(pitch.width / 2), 1.0).reshape(-1, 2)
     points = pitch.lift(grid)
     seen = inside(camera.project(points), camera.intrinsics.size)
@@ -243,7 +233,7 @@ def _visible_pitch(pitch: Field, camera: Camera) -> Array:
 
 
 def _stand(cameras: Sequence[Camera], seen: Sequence[Array]) -> Pose:
-    """Where the virtual camera stands, and its horizontal line of sight."""
+    """Return the pose of the virtual camera, with a horizontal line of sight."""
     axes = np.array([camera.pose.matrix[2, :2] for camera in cameras])
     axis = (axes / np.maximum(np.linalg.norm(axes, axis=1, keepdims=True), 1e-9)).mean(axis=0)
     ahead = axis / np.linalg.norm(axis) if np.linalg.norm(axis) > 0.3 else np.array([0.0, 1.0])
@@ -254,8 +244,9 @@ def _stand(cameras: Sequence[Camera], seen: Sequence[Array]) -> Pose:
     along = offset @ ahead
     # To the side, or down for cameras that hang above the pitch.
     aside = np.maximum(np.abs(offset @ [ahead[1], -ahead[0]]), position[2] - points[:, 2])
-    if np.any(aside > np.tan(np.radians(TOO_WIDE_DEG)) * along):
-        back = np.max(aside / np.tan(np.radians(STANDING_BACK_DEG)) - along)
+    # It stands back where they see the field farther than 80° to the side, until it has 60°.
+    if np.any(aside > np.tan(np.radians(80.0)) * along):
+        back = np.max(aside / np.tan(np.radians(60.0)) - along)
         steepness = [
             camera.pose.position[2] / np.median(np.linalg.norm(own[:, :2] - camera.pose.position[:2], axis=1))
             for camera, own in zip(cameras, seen, strict=True)
@@ -270,17 +261,19 @@ def _stand(cameras: Sequence[Camera], seen: Sequence[Array]) -> Pose:
 def _window(
     pitch: Field, aim: LevelView, cameras: Sequence[Camera], seen: Array, border: float
 ) -> tuple[float, float, float, float]:
-    """Left, right, top, bottom of the view in the picture plane of `aim`: the pitch, and around it what is seen."""
+    """Return left, right, top, bottom of the view in the plane of `aim`: the field, and around it what is seen."""
     on_plane = aim.project(seen)
     widest = _borders(aim, WIDEST_DEG[aim.projection])
     within = (on_plane[:, 0] > widest[0]) & (on_plane[:, 0] < widest[1])
     if not within.any():
-        return *_borders(aim, NOTHING_SEEN_DEG), -1.0, 1.0
+        return *_borders(aim, 90.0), -1.0, 1.0
     on_plane = on_plane[within]
     (left, top), (right, bottom) = on_plane.min(axis=0), on_plane.max(axis=0)
     width, height = right - left, bottom - top
-    left, right = left - AROUND_SIDES * width, right + AROUND_SIDES * width
-    top, bottom = top - AROUND_ABOVE * height, bottom + AROUND_BELOW * height
+    # So much around the visible field, in its widths and heights in the picture.
+    aside = 0.03 * width
+    left, right = left - aside, right + aside
+    top, bottom = top - 0.8 * height, bottom + 0.15 * height
 
     step = (right - left) / 240
     columns, rows = np.arange(left, right, step), np.arange(top, bottom, step)

@@ -1,1 +1,1 @@
-"""Cameras that shake while they film: where each of them was when each frame of a clip was taken."""
+"""Tracking of cameras that shake while they film: the pose of each for each frame of a clip."""

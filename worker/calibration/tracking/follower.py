@@ -1,4 +1,4 @@
-"""Follows the cameras of an installation through a clip: frame by frame the lines, over time the filter."""
+"""Tracker of an installation's cameras through a clip: lines frame by frame, the filter over time."""
 
 from __future__ import annotations
 
@@ -19,25 +19,16 @@ from worker.calibration.refinement.uncertainty import Sigma
 from worker.calibration.tracking.line_observations import Sighting, TrackedLines
 from worker.calibration.tracking.motion_filter import GATE, FilterStep, State, smoothed
 
-FIRST_SEARCH_PX = (28.0, *REFINEMENT_SEARCH_PX)
-"""Round by round, in pixels of a 4K frame: the first frame may be taken at the end of a swing."""
-KNOWN_PX = 4.0
-"""Lines that may be farther off in later frames, one standard deviation, are searched for step by step."""
-
-LEAST_AGREEMENT = 0.3
-"""Of the lines that the first frame has to show where the cameras are found, beyond what chance would."""
-
 How = Literal["measured", "coasted", "refused"]
 
 
 @dataclass(frozen=True)
 class TrackedPose:
-    """A camera when one frame was taken.
+    """Pose of a camera for one frame.
 
-    `how`: whether its lines were `measured`, or it went on as it went because they were not looked for or not seen
-    (`coasted`), or because they contradicted all that was known, or each other (`refused`). `motion_covariance` (6, 6)
-    of turn (rad) and shift (m): how sure the motion since the reference is; `covariance`: with how sure the reference
-    is.
+    `how`: `measured` by its lines; `coasted` along its motion because they were not looked for or not seen; or
+    `refused` because they contradicted all that was known, or each other. `motion_covariance` (6, 6) of turn (rad) and
+    shift (m): of the motion since the reference; `covariance`: with that of the reference.
     """
 
     camera: Camera
@@ -47,30 +38,29 @@ class TrackedPose:
 
     @property
     def sigma(self) -> Sigma:
-        """How sure the pose is."""
+        """Standard deviation of the pose."""
         return Sigma.from_covariance(self.covariance)
 
     @property
     def motion_sigma(self) -> Sigma:
-        """How sure its motion is."""
+        """Standard deviation of the motion."""
         return Sigma.from_covariance(self.motion_covariance)
 
 
 @dataclass(frozen=True)
 class TrackedMoment:
-    """All cameras when the frames of this number, from 0, were taken."""
+    """Poses of all cameras for the frames of this number, from 0."""
 
     number: int
     cameras: Sequence[TrackedPose]
 
 
 class CameraTracker:
-    """Takes the frames of a clip one after the other.
+    """Tracker that takes the frames of a clip one after the other.
 
-    What it `see`s of a moment it says at once; what it makes of that moment once it has seen `look_ahead` frames more
-    is `settled`. `cameras`: as stored, at most a fraction of a degree off; `first`: the first frames of the clip, by
-    camera. `every`: lines are measured in every so many-th frame. Raises `CalibrationError` if the first frame of a
-    camera does not show its lines.
+    `see` answers each moment at once; `settled` answers it again after `look_ahead` frames more. `cameras`: as stored,
+    at most a fraction of a degree off; `first`: the first frames of the clip, by camera. `every`: lines are measured in
+    every so many-th frame. Raises `CalibrationError` if the first frame of a camera does not show its lines.
     """
 
     def __init__(
@@ -91,12 +81,12 @@ class CameraTracker:
 
     @property
     def references(self) -> list[Camera]:
-        """The cameras where the first frame shows them: the ones that motion is counted from."""
+        """Cameras at their poses in the first frame, from which motion is counted."""
         return [track.lines.reference for track in self._tracks]
 
     @property
     def looks(self) -> bool:
-        """Whether lines are measured in the frames that are next: where frames were missing, in the first that come."""
+        """True if lines are measured in the next frames: where frames were missing, in the first that come."""
         return self._since_look >= self._every
 
     def see(self, pictures: Mapping[str, PixelReader], seconds: float | None = None) -> TrackedMoment:
@@ -113,19 +103,19 @@ class CameraTracker:
 
     @property
     def now(self) -> TrackedMoment:
-        """The moment of the last frames, by all frames up to it."""
+        """Moment of the last frames, by all frames up to it."""
         return TrackedMoment(self._taken - 1, [track.newest() for track in self._tracks])
 
     def predicted(self, seconds: float) -> TrackedMoment:
-        """The moment so long after the last frames, should the cameras go on as they go."""
+        """Return the moment so long after the last frames, should the cameras go on as they go."""
         return TrackedMoment(self._taken - 1, [track.predicted(seconds) for track in self._tracks])
 
     def settled(self) -> list[TrackedMoment]:
-        """The moments that enough frames have been seen after, each of them once."""
+        """Return the moments that enough frames have been seen after, each of them once."""
         return self._settle(self._taken - self._look_ahead)
 
     def rest(self) -> list[TrackedMoment]:
-        """The last moments, after the last frames."""
+        """Return the last moments, after the last frames."""
         return self._settle(self._taken)
 
     def _settle(self, until: int) -> list[TrackedMoment]:
@@ -135,7 +125,7 @@ class CameraTracker:
 
 
 class _Track:
-    """One camera on its way."""
+    """Track of one camera."""
 
     def __init__(self, pitch: Field, reference: Camera, covariance: Array, first: Frame) -> None:
         self.lines = TrackedLines(pitch, reference, first)
@@ -152,21 +142,21 @@ class _Track:
     def see(self, picture: PixelReader | None, seconds: float) -> None:
         """Take the next picture, so long after the one before; None: it is not looked at, or not there."""
         self.lines.forget(seconds)
-        expected = self._last.after(seconds).drawn_back(seconds)
+        expected = self._last.after(seconds).with_mast_prior(seconds)
         how, self._last = self._known(picture, expected)
         self._steps.append(FilterStep(seconds, self._last))
         self._how.append(how)
 
     def newest(self) -> TrackedPose:
-        """Where it is now."""
+        """Return the pose for the last frame."""
         return self._followed(self._last, self._how[-1])
 
     def predicted(self, seconds: float) -> TrackedPose:
-        """Where it will be so long after, and how sure that is."""
-        return self._followed(self._last.after(seconds).drawn_back(seconds), self._how[-1])
+        """Return the pose so long after the last frame, with its uncertainty."""
+        return self._followed(self._last.after(seconds).with_mast_prior(seconds), self._how[-1])
 
     def oldest(self) -> TrackedPose:
-        """The oldest moment that has not settled, by all frames so far; it is forgotten then."""
+        """Return the oldest pose that has not settled, smoothed by all frames so far, and forget it."""
         state, how = smoothed(self._steps)[0], self._how[0]
         del self._steps[0], self._how[0]
         return self._followed(state, how)
@@ -181,7 +171,7 @@ class _Track:
         sighting = self._sighted(picture, expected)
         if sighting is None:
             return "coasted", expected
-        if expected.surprise(sighting.observed) > GATE or not self.lines.fits(sighting, self._is_refused):
+        if expected.squared_innovation(sighting.observed) > GATE or not self.lines.fits(sighting, self._is_refused):
             self._is_refused = True
             return "refused", expected
         self._is_refused = False
@@ -190,26 +180,29 @@ class _Track:
         return "measured", known
 
     def _sighted(self, picture: PixelReader, expected: State) -> Sighting | None:
-        """The lines, from where the camera is expected; step by step where that is hardly known."""
+        """Observe the lines, from where the camera is expected; step by step where that is hardly known."""
         camera = moved(self.lines.reference, expected.change)
-        if self._off_px(expected) > KNOWN_PX:
+        if self._off_px(expected) > 4.0:
             return self.lines.searched(picture, camera)
         return self.lines.sighted(picture, camera)
 
     def _off_px(self, expected: State) -> float:
-        """How far lines may be from where they are expected, one standard deviation in pixels of a 4K frame."""
+        """Return the standard deviation of expected lines, in pixels of a 4K frame."""
         lens = self.lines.reference.intrinsics
         turn = float(np.sqrt(np.trace(expected.change_covariance[:3, :3])))
         return turn * lens.focal_length_px / lens.relative_size
 
 
 def _references(pitch: Field, cameras: Sequence[Camera], first: Mapping[str, Frame]) -> list[tuple[Camera, Array]]:
-    """The cameras where their first frames show them, and the covariances (6, 6) of their poses."""
+    """Return the cameras at their poses in their first frames, and the covariances (6, 6) of these."""
     responses = [np.zeros(first[camera.id].shape[:2], np.float32) for camera in cameras]
     observations = Observations([Channels([first[camera.id]]) for camera in cameras], responses)
     found = []
-    for one in refine(pitch, cameras, observations, 0.5, searches_px=FIRST_SEARCH_PX).each:
-        if one.covariance is None or one.evidence.agreement < LEAST_AGREEMENT:
+    # Half width of the first frame's search round by round, in pixels of a 4K frame: it may be taken at the end of a
+    # swing.
+    for one in refine(pitch, cameras, observations, 0.5, searches_px=(28.0, *REFINEMENT_SEARCH_PX)).each:
+        # Least share of lines, beyond chance, that the first frame has to show where the cameras are found.
+        if one.covariance is None or one.evidence.agreement < 0.3:
             raise _not_seen(one.camera)
         found.append((one.camera, one.covariance))
     return found

@@ -1,4 +1,4 @@
-"""How far each piece of line lies beside where the model has it, as its sights have taught it and time has faded it."""
+"""Offsets of pieces of line from their place in the model, learned from sights and faded by time."""
 
 from __future__ import annotations
 
@@ -8,9 +8,7 @@ from numpy.typing import NDArray
 from worker.calibration.geometry.camera import Array
 
 FORGOTTEN_IN_S = 3600.0
-"""What a sight teaches counts 1/e after so long: the sun and the ground move a line's place within a day."""
-FADED = 0.01
-"""Pieces of which less is known than this share of one fresh sight count as never seen."""
+"""Time after which a sight counts 1/e: the sun and the ground move a line's place within a day."""
 
 
 class LearnedOffsets:
@@ -39,15 +37,16 @@ class LearnedOffsets:
 
     @property
     def are_known(self) -> NDArray[np.bool_]:
-        """Which pieces (N,) have been seen, not too long ago."""
-        return self._information > FADED * self._by_sight
+        """True for pieces (N,) that have been seen, not too long ago."""
+        # Share of one fresh sight below which a piece counts as never seen.
+        return self._information > 0.01 * self._by_sight
 
     def are_seen_as_often(self, share: float) -> NDArray[np.bool_]:
-        """Which pieces (N,) have been seen of late by this share, 0..1, as often as the one that was seen most."""
+        """True for pieces (N,) seen of late at least `share`, 0..1, as often as the one seen most."""
         return self._information >= share * self._information.max()
 
     def learn(self, pieces: NDArray[np.intp], offsets: Array) -> None:
-        """Take how far these pieces (M,), each named once, were seen (M,) beside their places, px."""
+        """Take measured offsets (M,), px, of pieces (M,), each named once."""
         self._information[pieces] += self._by_sight
         self._sum[pieces] += offsets * self._by_sight
 

@@ -1,4 +1,4 @@
-"""What the painted lines of one frame say of the pose of a camera that is almost where it is expected. No network.
+"""Observation of a camera's pose by the painted lines of one frame, near where it is expected. No network.
 
 Lens, paint and ground put each piece of line a little beside where the model has it, frame after frame by as much. That
 is learned, piece by piece, while the clip runs: otherwise the pose would jump whenever a player hides some of them.
@@ -14,74 +14,51 @@ from numpy.typing import NDArray
 from worker.calibration.detection.contrast import Channels, PixelReader
 from worker.calibration.detection.line_matching import known_contrasts
 from worker.calibration.detection.line_measurement import LineProfiles
-from worker.calibration.geometry.camera import Array, Camera, Frame
-from worker.calibration.geometry.derivatives import POSE_NUMBERS, change_between, moved, pixel_slopes
+from worker.calibration.geometry.arrays import Array, take_rows
+from worker.calibration.geometry.camera import Camera, Frame
+from worker.calibration.geometry.derivatives import POSE_NUMBERS, change_between, moved, pixel_jacobian
 from worker.calibration.geometry.field import Field, LinePoints
 from worker.calibration.geometry.visibility import VisibleLines
+from worker.calibration.refinement.estimate import POSE_SIGMA
 from worker.calibration.refinement.least_squares import CLUSTER_POINTS
 from worker.calibration.robust import huber_weights, tukey_weights
 from worker.calibration.tracking.learned_offsets import LearnedOffsets
 from worker.calibration.tracking.motion_filter import PoseObservation
 from worker.calibration.tracking.telling_pieces import most_telling
 
-APART_PX = 12.0
-"""Pieces of line are looked at about so far apart, in pixels of a 4K frame."""
-COARSELY = 3
-"""Where a camera is hardly known, every so many-th piece is looked for at first."""
-FEW, LEARNING, ALL_EVERY = 200, 25, 50
-"""So many pieces are looked at once so many looks have been at all of them, and all again in every so many-th look."""
-OFTEN = 0.5
-"""Pieces that are seen less often than this share of the most that one is seen are not among the few."""
-SEARCH_PX, NEAR_PX, LOST_SEARCH_PX = 8.0, 3.0, (28.0, 14.0)
-"""How near, in pixels of a 4K frame, pieces are looked for: at first, again from where the camera is then found, and
-before that, round by round, where it is hardly known."""
-NEARBY_PX = 2.0
-"""Lines that lie so near to where they were expected, in the median and pixels of a 4K frame, are measured once."""
-FEWEST_PIECES, FEWEST_SHARE = 20, 0.3
-"""With fewer pieces of line, or with less than this share of those that are usually found, a frame says nothing."""
-SHOWN, AT_REFERENCE_PX = 0.5, 3.0
-"""Of a marking so much has to be found near the reference, in pixels of a 4K frame, for it to be followed."""
-NOVELTY = 0.05
-"""By so much of the difference a frame changes how many are usual, and how far they lie from where a pose has them."""
-MOST_MISFIT, MOST_MISFIT_ANEW, LEAST_MISFIT = 3.0, 2.0, 0.3
-"""Lines contradict each other where the median residual is so many times the usual one, of a camera that was refused
-in the look before so many times, and the usual one counts as no less than so many expected errors. Five times it is
-after a zoom by 0.5 %; twice in noise of 25 grey levels, in JPEGs of quality 8 and out of focus by two pixels, all of a
-sudden; players and shadows do not reach a median."""
-BESIDE_PX = 1.0
-"""How far a piece of line may lie beside its place for good, one standard deviation, in pixels of a 4K frame."""
+FEW, LEARNING = 200, 25
+"""Number of pieces that are looked at after `LEARNING` looks at all of them."""
+FEWEST_PIECES = 20
+"""Fewest pieces of line for a frame to count."""
+AT_REFERENCE_PX = 3.0
+"""Half width of the search for markings near the reference, in pixels of a 4K frame."""
 NOISE_PX = 0.1
 """Least error of the measurement of a piece, in pixels of the frame."""
-PICTURE_PX = 0.04
-"""Error that all pieces of a frame have in common: what a codec and the grid of pixels do to every line alike."""
-PRIOR = np.diag(np.repeat([0.03, 1.0], 3) ** -2.0)
-"""Information (6, 6) without any line, standard deviations of 0.03 rad and a metre: it holds the directions of which
-lines say nothing; much wider than anything that is followed."""
-STEPS = 3
+PRIOR = np.diag(POSE_SIGMA**-2)
 
 
 @dataclass(frozen=True)
 class LineObservations:
-    """Pieces of line as one frame shows them, M of them.
+    """Pieces of line in one frame, M of them.
 
-    `expected`: the camera they were looked for with; `piece` (M,): which of them; `offset` (M,) px: how far each is
-    from where that camera expects it, and `slope` (M, 6): how that expectation moves with its pose; `share`: of those
-    that were looked for.
+    `expected`: the camera they were looked for with; `piece` (M,): which of them; `offset` (M,) px: of each from where
+    that camera expects it, and `jacobian` (M, 6): Jacobian of that expectation by its pose; `share`: of those that were
+    looked for.
     """
 
     expected: Camera
     piece: NDArray[np.intp]
     offset: Array
-    slope: Array
+    jacobian: Array
     share: float
 
     def __getitem__(self, chosen: NDArray[np.bool_]) -> LineObservations:
-        return LineObservations(self.expected, self.piece[chosen], self.offset[chosen], self.slope[chosen], self.share)
+        return take_rows(self, chosen)
 
 
 @dataclass(frozen=True)
 class Sighting:
-    """Pieces that were `seen`, and what was `observed` by them.
+    """Pieces that were `seen`, and the observation of the pose by them.
 
     `misfit`: the median distance from where the observed pose has them, in expected errors: what no pose explains.
     """
@@ -101,17 +78,18 @@ class _ReadPieces:
 
 
 class TrackedLines:
-    """The lines that one camera is followed by; `reference`: the camera that changes are counted from.
+    """Lines by which one camera is followed; `reference`: the camera from which changes are counted.
 
-    `first`: the frame that the reference was found in. Markings that it hardly shows are not looked for, and in which
-    channel each of the others stands out is looked up in it: later pictures are read in that one alone.
+    `first`: the frame that the reference was found in. Markings that it hardly shows are not looked for, and the
+    channel in which each of the others stands out is looked up in it: later pictures are read in that one alone.
     """
 
     def __init__(self, pitch: Field, reference: Camera, first: Frame) -> None:
         self.reference = reference
         self._scale = reference.intrinsics.relative_size
         lines, channels = pitch.line_points(), Channels([first])
-        expected = VisibleLines.from_camera(lines, reference).thinned(APART_PX * self._scale).index
+        # Approximate distance between pieces of line, in pixels of a 4K frame.
+        expected = VisibleLines.from_camera(lines, reference).thinned(12.0 * self._scale).index
         visible = VisibleLines.from_camera(lines[expected], reference)
         self._contrasts = known_contrasts(visible, channels, AT_REFERENCE_PX * self._scale, self._scale)
         chosen = self._shown(lines, expected, channels)
@@ -121,10 +99,11 @@ class TrackedLines:
         self._looks = 0
         self._patch = chosen // CLUSTER_POINTS
         self._usual = self._usual_misfit = 0.0
-        self._beside = LearnedOffsets(len(chosen), BESIDE_PX * self._scale, NOISE_PX)
+        # Standard deviation of a piece of line's lasting offset from its place, in pixels of a 4K frame.
+        self._beside = LearnedOffsets(len(chosen), self._scale, NOISE_PX)
 
     def _shown(self, lines: LinePoints, expected: NDArray[np.intp], channels: Channels) -> NDArray[np.intp]:
-        """Which of the line points: some of each marking that the first frame shows."""
+        """Return the line points on markings of which the first frame shows enough."""
         reach_px = AT_REFERENCE_PX * self._scale
         profiles = LineProfiles.read_known(lines[expected], self.reference, channels, self._contrasts, reach_px)
         found = profiles.measure(self.reference, lines[expected], reach_px).index
@@ -133,12 +112,12 @@ class TrackedLines:
             np.bincount(marking[found], minlength=len(lines)),
             np.bincount(marking, minlength=len(lines)),
         )
-        return expected[(known >= SHOWN * looked_for)[marking]]
+        return expected[(known >= 0.5 * looked_for)[marking]]
 
     def sighted(self, picture: PixelReader, expected: Camera) -> Sighting | None:
         """Measure lines near where the camera `expected` puts them; None where too few are found.
 
-        Of a camera that has been seen for a while a few telling pieces are looked at, all of them from time to time:
+        For a camera that has been seen for a while a few telling pieces are looked at, all of them from time to time:
         those that were hidden come back.
         """
         return self._near(picture, expected, self._next_pieces())
@@ -146,26 +125,30 @@ class TrackedLines:
     def searched(self, picture: PixelReader, expected: Camera) -> Sighting | None:
         """Measure lines in ever narrower searches, for a camera whose pose is hardly known; None as `sighted`."""
         pieces = self._next_pieces()
-        for search in LOST_SEARCH_PX:
-            sighting = self._within(search, self._read(picture, expected, pieces[::COARSELY], search), expected)
+        for search in (28.0, 14.0):
+            sighting = self._within(search, self._read(picture, expected, pieces[::3], search), expected)
             if sighting is None:
                 return None
             expected = moved(self.reference, sighting.observed.change)
         return self._near(picture, expected, pieces)
 
     def fits(self, sighting: Sighting, anew: bool) -> bool:
-        """Whether the pieces lie about as near as usual to where the observed pose has them.
+        """True if the pieces lie about as near as usual to where the observed pose has them.
 
         With another lens than the reference's, or another marking taken for one, each pose leaves some of them off.
-        `anew`: whether the camera was refused in the look before; then it has to be nearer.
+        `anew`: True if the camera was refused in the look before; then it has to be nearer.
         """
-        most = MOST_MISFIT_ANEW if anew else MOST_MISFIT
-        return sighting.misfit <= most * max(LEAST_MISFIT, self._usual_misfit)
+        # Limits of the median residual: in multiples of the usual one, the same for a camera that was refused in the
+        # look before, and the least usual one in expected errors. Five times it is after a zoom by 0.5 %; twice in
+        # noise of 25 grey levels, in JPEGs of quality 8 and out of focus by two pixels, all of a sudden; players and
+        # shadows do not reach a median.
+        most = 2.0 if anew else 3.0
+        return sighting.misfit <= most * max(0.3, self._usual_misfit)
 
     def _next_pieces(self) -> NDArray[np.intp]:
-        """Which pieces are looked at in the next picture: all, or a few that were chosen once all had been learned."""
+        """Return the pieces for the next picture: all, or a few that were chosen once all had been learned."""
         self._looks += 1
-        if self._looks <= LEARNING or self._looks % ALL_EVERY == 0:
+        if self._looks <= LEARNING or self._looks % 50 == 0:
             self._few = None
             return self._all
         if self._few is None:
@@ -173,20 +156,23 @@ class TrackedLines:
         return self._few
 
     def _near(self, picture: PixelReader, expected: Camera, pieces: NDArray[np.intp]) -> Sighting | None:
-        """Pieces that are looked for once, and once more from where the camera is found if they are not nearby.
+        """Look for pieces once, and once more from where the camera is found if they are not nearby.
 
         What is measured far from where it was expected is a little off.
         """
-        read = self._read(picture, expected, pieces, SEARCH_PX)
-        sighting = self._within(SEARCH_PX, read, expected)
+        # Half widths of the search, in pixels of a 4K frame: at first, and again from where the camera is then found.
+        search_px = 8.0
+        read = self._read(picture, expected, pieces, search_px)
+        sighting = self._within(search_px, read, expected)
         if sighting is None:
             return None
-        if np.median(np.abs(sighting.seen.offset)) < NEARBY_PX * self._scale:
+        if np.median(np.abs(sighting.seen.offset)) < 2.0 * self._scale:
             return sighting
         found = moved(self.reference, sighting.observed.change)
-        if not read.profiles.cover(found, read.lines, NEAR_PX * self._scale):
-            read = self._read(picture, found, pieces, NEAR_PX)
-        return self._within(NEAR_PX, read, found)
+        near_px = 3.0
+        if not read.profiles.cover(found, read.lines, near_px * self._scale):
+            read = self._read(picture, found, pieces, near_px)
+        return self._within(near_px, read, found)
 
     def _read(self, picture: PixelReader, expected: Camera, pieces: NDArray[np.intp], reach_px: float) -> _ReadPieces:
         lines = self._pieces[pieces]
@@ -198,47 +184,48 @@ class TrackedLines:
             return None
         found = read.profiles.measure(expected, read.lines, search_px * self._scale)
         points = found.points.position
-        offset = np.sum((found.pixel - expected.project(points)) * found.normal, axis=1)
-        slope = np.einsum("mij,mi->mj", pixel_slopes(expected, points), found.normal)
-        good = np.isfinite(offset) & np.isfinite(slope).all(axis=1)
+        # The measured offset falls as the expected place moves.
+        offset, jacobian = found.offset(expected, points), -found.jacobian(expected, points)
+        good = np.isfinite(offset) & np.isfinite(jacobian).all(axis=1)
         share = good.sum() / len(read.pieces)
-        if good.sum() < FEWEST_PIECES or share < FEWEST_SHARE * self._usual:
+        if good.sum() < FEWEST_PIECES or share < 0.3 * self._usual:
             return None
-        seen = LineObservations(expected, read.pieces[found.index[good]], offset[good], slope[good], share)
+        seen = LineObservations(expected, read.pieces[found.index[good]], offset[good], jacobian[good], share)
         return self.explained(seen)
 
     def _telling(self) -> NDArray[np.intp]:
-        """The few pieces that are looked at: of those that are seen at least half as often as others."""
-        often = np.flatnonzero(self._beside.are_seen_as_often(OFTEN))
+        """Return the few pieces that are looked at: of those that are seen at least half as often as others."""
+        often = np.flatnonzero(self._beside.are_seen_as_often(0.5))
         seen = VisibleLines.from_camera(self._pieces[often], self.reference)
-        slopes = np.einsum("mij,mi->mj", pixel_slopes(self.reference, seen.points.position), seen.normal) / NOISE_PX
-        usable = np.flatnonzero(np.isfinite(slopes).all(axis=1))
+        jacobian = np.einsum("mij,mi->mj", pixel_jacobian(self.reference, seen.points.position), seen.normal) / NOISE_PX
+        usable = np.flatnonzero(np.isfinite(jacobian).all(axis=1))
         pieces = often[seen.index[usable]]
-        return pieces[most_telling(slopes[usable], self._patch[pieces], PRIOR, FEW)]
+        return pieces[most_telling(jacobian[usable], self._patch[pieces], PRIOR, FEW)]
 
     def explained(self, every: LineObservations) -> Sighting:
-        """What they say of the pose: robust least squares, with what pieces of one patch err together."""
+        """Return the observation of the pose by pieces: robust least squares, with the errors that a patch shares."""
         seen = self._known(every)
         sigma = self._sigma(seen)
-        rows, values = seen.slope / sigma[:, None], (seen.offset - self._beside.mean[seen.piece]) / sigma
+        rows, values = seen.jacobian / sigma[:, None], (seen.offset - self._beside.mean[seen.piece]) / sigma
         change = np.zeros(POSE_NUMBERS)
-        for weigh in (*STEPS * [huber_weights], *STEPS * [tukey_weights]):
+        for weigh in (*3 * [huber_weights], *3 * [tukey_weights]):
             weight = weigh(values - rows @ change)
             information = (rows * weight[:, None]).T @ rows
             change = np.asarray(np.linalg.solve(information + PRIOR, rows.T @ (weight * values)), float)
-        left = values - rows @ change
-        spread = self._spread(seen, rows * (weight * left)[:, None])
+        residual = values - rows @ change
+        spread = self._spread(seen, rows * (weight * residual)[:, None])
         together = float(np.trace(np.linalg.solve(information + PRIOR, spread))) / POSE_NUMBERS
         known = information / max(1.0, together)
-        of_picture = np.diag(np.repeat([PICTURE_PX / seen.expected.intrinsics.focal_length_px, 0.0], 3) ** 2)
+        # Error that all pieces of a frame have in common: what a codec and the grid of pixels do to every line alike.
+        of_picture = np.diag(np.repeat([0.04 / seen.expected.intrinsics.focal_length_px, 0.0], 3) ** 2)
         observed = PoseObservation(
             change_between(self.reference, moved(seen.expected, change)),
             np.asarray(np.linalg.solve(np.eye(POSE_NUMBERS) + known @ of_picture, known), float),
         )
-        return Sighting(every, observed, float(np.median(np.abs(left))))
+        return Sighting(every, observed, float(np.median(np.abs(residual))))
 
     def _known(self, seen: LineObservations) -> LineObservations:
-        """The pieces that have been seen before, or all where those are too few.
+        """Return the pieces that have been seen before, or all where those are too few.
 
         A whole line that a wrong lens puts at the end of what is looked at comes into it when the pose stirs, and would
         pull the pose by as much as it lies beside its place.
@@ -247,27 +234,28 @@ class TrackedLines:
         return seen[known] if known.sum() >= FEWEST_PIECES else seen
 
     def learn(self, sighting: Sighting, now: Camera) -> None:
-        """Keep how far beside their places the pieces lie when the camera is where it is `now` known to be."""
+        """Keep the offsets of the pieces from their places when the camera is where it is `now` known to be."""
         seen = sighting.seen
-        left = seen.offset - seen.slope @ change_between(seen.expected, now)
-        counted = tukey_weights((left - self._beside.mean[seen.piece]) / self._sigma(seen)) > 0
+        residual = seen.offset - seen.jacobian @ change_between(seen.expected, now)
+        counted = tukey_weights((residual - self._beside.mean[seen.piece]) / self._sigma(seen)) > 0
         which = seen.piece[counted]
-        novelty = NOVELTY if self._usual else 1.0
+        # Weight of a new frame in the usual share of pieces found, and in the usual misfit.
+        novelty = 0.05 if self._usual else 1.0
         self._usual += (seen.share - self._usual) * novelty
         self._usual_misfit += (sighting.misfit - self._usual_misfit) * novelty
-        self._beside.learn(which, left[counted])
+        self._beside.learn(which, residual[counted])
 
     def forget(self, seconds: float) -> None:
         """Let what was learned of the pieces fade by the time that passes."""
         self._beside.forget(seconds)
 
     def _sigma(self, seen: LineObservations) -> Array:
-        """Expected error (M,) in px of where the pieces are seen, and of what is known of where they lie."""
+        """Return the standard deviation (M,) in px of the pieces' measurements and of their learned places."""
         return np.sqrt(NOISE_PX**2 + self._beside.variance[seen.piece])
 
-    def _spread(self, seen: LineObservations, pulls: Array) -> Array:
-        """How the sum of pulls (M, 6) varies, (6, 6), those of a patch taken as one."""
+    def _spread(self, seen: LineObservations, gradients: Array) -> Array:
+        """Return the covariance (6, 6) of the sum of gradients (M, 6), those of a patch taken as one."""
         patches, patch = np.unique(self._patch[seen.piece], return_inverse=True)
         sums = np.zeros((len(patches), POSE_NUMBERS))
-        np.add.at(sums, patch, pulls)
+        np.add.at(sums, patch, gradients)
         return sums.T @ sums

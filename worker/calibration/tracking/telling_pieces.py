@@ -1,4 +1,4 @@
-"""Which few of many pieces of line say most of a camera's pose: near and far, all over the picture."""
+"""Choice of the few pieces of line that tell most about a camera's pose: near and far, all over the picture."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from numpy.typing import NDArray
 from worker.calibration.geometry.camera import Array
 
 
-def most_telling(slopes: Array, patch: NDArray[np.intp], prior: Array, count: int) -> NDArray[np.intp]:
-    """Indices, rising, of up to `count` of N pieces that together leave least open of a pose (D-optimal, greedily).
+def most_telling(jacobian: Array, patch: NDArray[np.intp], prior: Array, count: int) -> NDArray[np.intp]:
+    """Return indices, rising, of up to `count` of N pieces that leave least open of a pose (D-optimal, greedily).
 
-    `slopes` (N, 6): how far each moves, in its own standard deviation, per unit of the pose; `patch` (N,): pieces of
+    `jacobian` (N, 6): how far each moves, in its own standard deviation, per unit of the pose; `patch` (N,): pieces of
     one err together, so each further one of a patch counts for less; `prior` (6, 6): information without any piece.
     """
     covariance = np.asarray(np.linalg.inv(prior), float)
-    share = np.ones(len(slopes))
+    share = np.ones(len(jacobian))
     chosen: list[int] = []
-    for _ in range(min(count, len(slopes))):
-        reach = slopes @ covariance
-        gain = share**2 * np.einsum("nj,nj->n", reach, slopes)
+    for _ in range(min(count, len(jacobian))):
+        reach = jacobian @ covariance
+        gain = share**2 * np.einsum("nj,nj->n", reach, jacobian)
         gain[chosen] = -np.inf
         best = int(np.argmax(gain))
         covariance -= np.outer(reach[best], reach[best]) * share[best] ** 2 / (1 + gain[best])

@@ -81,7 +81,7 @@ def test_a_white_line_beside_a_blue_one_does_not_pull_it():
     found = measure_lines(lines("blue"), one, both, np.zeros_like(share), 14.0)
     # Along the rows the two lie on each other.
     across = found[np.abs(found.normal[:, 0]) > 0.8]
-    off = np.sum((across.pixel - one.project(across.points.position)) * across.normal, axis=1)
+    off = across.offset(one, across.points.position)
     assert len(across) > 20
     assert np.average(np.abs(off) < 1.0, weights=across.trust) > 0.75
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from fields.template import load
+from tests.worker.calibration.sights import grey_lines
 from tests.worker.calibration.synthetic import PITCH, camera, paint_markings
-from worker.calibration.detection.contrast import Channels
 from worker.calibration.detection.evidence import evidence_of
 from worker.calibration.detection.exclusions import left_out
 from worker.calibration.diagnostics.overlap import overlap_of
@@ -26,9 +26,8 @@ def both_painted():
 
 
 def seen(pitch):
-    frame = np.repeat((70 + 160 * both_painted()).astype(np.uint8)[..., None], 3, axis=2)
-    lines = pitch.line_points()
-    return evidence_of(lines, ONE, Channels([frame]), both_painted(), left_out(pitch, ONE))
+    channels = grey_lines(both_painted())
+    return evidence_of(pitch.line_points(), ONE, channels, both_painted(), left_out(pitch, ONE))
 
 
 def test_lines_of_another_sport_are_unexpected_until_they_are_listed():

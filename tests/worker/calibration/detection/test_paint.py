@@ -39,7 +39,8 @@ def test_each_paint_is_one_colour_in_light_and_in_shade(floor):
 @pytest.mark.parametrize("name", PAINTS)
 def test_lines_of_the_chosen_paint_alone_are_bright_all_along(floor, name):
     colours = sort_colours([floor], [EVERYWHERE])
-    drawn = draw_colours(floor, colours, [nearest(colours, name)[0]])[..., 0].astype(int)
+    (picture,) = draw_colours(floor, colours, [[nearest(colours, name)[0]]])
+    drawn = picture[..., 0].astype(int)
     assert drawn.shape == floor.shape[:2]
     for other, row in ROWS.items():
         along = np.array([drawn[row - 3 : row + 14, at].max() for at in range(20, 620, 10)])

@@ -11,7 +11,6 @@ from worker.calibration.detection.line_measurement import measure_lines
 from worker.calibration.diagnostics.line_registration import MeasuredLines, register_lines
 from worker.calibration.diagnostics.registration import PIXEL_M, Registration
 from worker.calibration.gate.pairs import CameraResponse, Pair, measured_by_lines
-from worker.calibration.gate.quality import Gate
 from worker.calibration.geometry.camera import Camera
 
 BLIND = np.zeros((1, 1), np.float32)
@@ -63,7 +62,7 @@ def test_of_a_pair_that_agrees_the_lines_say_how_far_it_is_apart() -> None:
     (left, right), frames = pair(), pair_frames()
     cameras = [seen(measured(left, left, frames[0])), seen(measured(right, right, frames[1]))]
     by_responses = Pair(left.id, right.id, 0.7, plenty=True, confirmed=True)
-    (by_lines,) = measured_by_lines(CROWNED, [by_responses], cameras, Gate())
+    (by_lines,) = measured_by_lines(CROWNED, [by_responses], cameras)
     assert by_lines.error_px == registered().error_px
     assert by_lines.registration is not None
 
@@ -73,4 +72,4 @@ def test_lines_do_not_gainsay_a_contradiction(error_px) -> None:
     (left, right), frames = pair(), pair_frames()
     cameras = [seen(measured(left, left, frames[0])), seen(measured(right, right, frames[1]))]
     by_responses = Pair(left.id, right.id, error_px, plenty=True, confirmed=False)
-    assert measured_by_lines(CROWNED, [by_responses], cameras, Gate()) == [by_responses]
+    assert measured_by_lines(CROWNED, [by_responses], cameras) == [by_responses]

@@ -6,8 +6,8 @@ from functools import cache
 import numpy as np
 import pytest
 
+from tests.worker.calibration.sights import grey_lines
 from tests.worker.calibration.synthetic import PITCH, camera, moved, paint_markings
-from worker.calibration.detection.contrast import Channels
 from worker.calibration.diagnostics.markings import MarkingReport, direction_of, in_words, report_markings
 from worker.calibration.geometry.field import FOOTBALL, Field
 from worker.calibration.refinement.refine import Observations, evaluate_poses, refine
@@ -26,8 +26,7 @@ def painted_elsewhere(name, place):
 def seen_by(camera, painted, blind=lambda paint: None):
     paint = paint_markings(painted, camera)
     blind(paint)
-    frame = np.repeat((70 + 160 * paint).astype(np.uint8)[..., None], 3, axis=2)
-    channels = Channels([frame])
+    channels = grey_lines(paint)
     (found,) = refine(PITCH, [camera], Observations([channels], [paint]), 0.5).each
     return {one.name: one for one in report_markings(PITCH, found, channels, paint)}
 
@@ -113,8 +112,7 @@ def test_dashes_and_rows_are_one_marking():
 def test_what_lies_beside_the_lines_of_a_lost_camera_is_not_told_as_paint_that_is_elsewhere():
     """The frame of another view: there are lines everywhere, and none of them is where the pose says."""
     paint = paint_markings(PITCH, moved(CORNER, (0.0, 0.12, 0.0)))
-    frame = np.repeat((70 + 160 * paint).astype(np.uint8)[..., None], 3, axis=2)
-    channels = Channels([frame])
+    channels = grey_lines(paint)
     (lost,) = evaluate_poses(PITCH, [CORNER], Observations([channels], [paint])).each
     told = report_markings(PITCH, lost, channels, paint)
     assert told

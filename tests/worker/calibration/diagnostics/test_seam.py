@@ -6,18 +6,17 @@ from functools import cache
 import numpy as np
 import pytest
 
-from tests.worker.calibration.synthetic import CROWNED, moved, pair, pair_frames, pair_markings
-from worker.calibration.detection.contrast import Channels
+from tests.worker.calibration.sights import pair_observed
+from tests.worker.calibration.synthetic import CROWNED, moved, pair
 from worker.calibration.diagnostics.seam import measure_seam
-from worker.calibration.refinement.refine import Observations, evaluate_poses
+from worker.calibration.refinement.refine import evaluate_poses
 
 
 @cache
 def seam(by=(0.0, 0.0, 0.0)):
     """Of the pair, the right camera believed to stand beside where it does."""
     left, right = pair()
-    sight = Observations([Channels([frame]) for frame in pair_frames()], pair_markings())
-    return measure_seam(CROWNED, *evaluate_poses(CROWNED, [left, moved(right, by=by)], sight).each)
+    return measure_seam(CROWNED, *evaluate_poses(CROWNED, [left, moved(right, by=by)], pair_observed()).each)
 
 
 def test_cameras_in_their_places_agree_all_along_the_seam():
@@ -45,8 +44,6 @@ def test_the_places_are_in_order_from_end_to_end_and_the_worst_is_named():
 
 
 def test_cameras_that_have_measured_nothing_in_common_have_no_seam():
-    left, right = pair()
-    sight = Observations([Channels([frame]) for frame in pair_frames()], pair_markings())
-    first, second = evaluate_poses(CROWNED, [left, right], sight).each
-    assert measure_seam(CROWNED, first, replace(second, measured=None)).places == []
-    assert measure_seam(CROWNED, first, replace(second, measured=None)).worst is None
+    first, second = evaluate_poses(CROWNED, pair(), pair_observed()).each
+    none = measure_seam(CROWNED, first, replace(second, measured=None))
+    assert (none.places, none.worst) == ([], None)

@@ -6,34 +6,27 @@ import numpy as np
 import pytest
 
 from fields.template import Template, load
+from tests.worker.calibration.sights import observed
 from tests.worker.calibration.synthetic import (
     BARREL,
     CROWNED,
     PITCH,
     camera,
     moved,
-    paint_frame,
-    paint_markings,
     pair,
     pair_frames,
 )
 from tests.worker.calibration.test_calibrate import white_on_green
-from worker.calibration.detection.contrast import Channels
 from worker.calibration.field_fit.measures import fit_field, fit_measures
 from worker.calibration.geometry.field import Field
-from worker.calibration.refinement.refine import Observations
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
 
 
 def fitted(truth, cameras, given):
     """The pitch that the lines of `truth` make of a `given` one, by cameras a little off, and its measures by name."""
-    sight = Observations(
-        [Channels([paint_frame(truth, c)]) for c in cameras],
-        [paint_markings(truth, c) for c in cameras],
-    )
     start = [moved(c, (0.0008, -0.0006, 0.0005), (0.02, -0.03, 0.02)) for c in cameras]
-    refined, measures = fit_measures(given, start, sight, 0.5)
+    refined, measures = fit_measures(given, start, observed(truth, cameras), 0.5)
     return refined, {measure.name: measure for measure in measures}
 
 

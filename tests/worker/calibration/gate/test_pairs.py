@@ -9,10 +9,7 @@ from tests.worker.calibration.synthetic import PITCH, moved, paint_markings
 from worker.calibration.detection.evidence import Evidence
 from worker.calibration.diagnostics.registration import Response
 from worker.calibration.gate.pairs import CameraResponse, Pair, compare_pairs, find_contradictions, stitch_error_px
-from worker.calibration.gate.quality import Gate
 from worker.calibration.geometry.camera import Camera, inside
-
-GATE = Gate()
 
 
 def pair(cameras: str, error_px: float | None, *, plenty: bool = True, confirmed: bool = False) -> Pair:
@@ -28,7 +25,7 @@ def seeing(one: Camera, response: Response, share: float = 1.0) -> CameraRespons
 
 
 def blamed(*pairs: Pair) -> set[str]:
-    return {camera for one in find_contradictions(pairs, GATE) for camera in one.blamed}
+    return {camera for one in find_contradictions(pairs) for camera in one.blamed}
 
 
 def test_cameras_that_agree_are_not_to_blame_for_anything() -> None:
@@ -36,10 +33,10 @@ def test_cameras_that_agree_are_not_to_blame_for_anything() -> None:
 
 
 def test_two_that_are_less_than_a_pixel_of_their_frames_apart_agree_however_much_grass_that_is() -> None:
-    assert Pair("a", "b", 4.0, plenty=True, confirmed=True, shift_px=0.9).agrees(GATE)
+    assert Pair("a", "b", 4.0, plenty=True, confirmed=True, shift_px=0.9).agrees()
     beyond = Pair("a", "b", 4.0, plenty=True, confirmed=True, shift_px=1.2)
-    assert beyond.disagrees(GATE)
-    assert "stitch error 4.00 px, at most 1.5 allowed, which is 1.2 px of a frame" in beyond.words(GATE)
+    assert beyond.disagrees()
+    assert "stitch error 4.00 px, at most 1.5 allowed, which is 1.2 px of a frame" in beyond.words()
 
 
 def test_a_pair_says_by_how_many_pixels_of_a_frame_it_is_apart() -> None:
@@ -49,7 +46,7 @@ def test_a_pair_says_by_how_many_pixels_of_a_frame_it_is_apart() -> None:
     responses = [paint_markings(PITCH, camera) for camera in (one, other)]
     (apart,) = compare_pairs(PITCH, [seeing(one, responses[0]), seeing(turned, responses[1])])
     assert apart.shift_px == pytest.approx(np.radians(0.5) * 600, rel=0.35)
-    assert not apart.agrees(GATE)
+    assert not apart.agrees()
 
 
 @pytest.mark.parametrize("error_px", [4.0, None])
@@ -80,22 +77,22 @@ def test_two_that_see_what_they_share_where_their_poses_put_it_need_not_register
 
 
 def test_a_contradiction_is_told_with_both_names_and_with_whose_fault_it_is() -> None:
-    (both,) = find_contradictions([pair("ab", 4.0)], GATE)
-    assert both.words(GATE).startswith("the cameras a and b do not fit each other: stitch error 4.00 px, at most 1.5")
-    (one,) = find_contradictions([pair("ab", 0.1), pair("bc", None)], GATE)
-    assert one.words(GATE).startswith("camera c: the views of b and c should show the same markings but cannot")
+    (both,) = find_contradictions([pair("ab", 4.0)])
+    assert both.words().startswith("the cameras a and b do not fit each other: stitch error 4.00 px, at most 1.5")
+    (one,) = find_contradictions([pair("ab", 0.1), pair("bc", None)])
+    assert one.words().startswith("camera c: the views of b and c should show the same markings but cannot")
 
 
 def test_the_stitch_error_is_that_of_the_worst_pair_that_can_be_compared() -> None:
-    assert stitch_error_px([pair("ab", 0.2), pair("bc", 0.4), pair("ac", None, plenty=False)], GATE) == 0.4
-    assert stitch_error_px([pair("ab", 4.0)], GATE) == 4.0
-    assert stitch_error_px([pair("ab", 0.2), pair("bc", None)], GATE) is None
-    assert stitch_error_px([pair("ab", None, plenty=False)], GATE) is None
-    assert stitch_error_px([], GATE) is None
+    assert stitch_error_px([pair("ab", 0.2), pair("bc", 0.4), pair("ac", None, plenty=False)]) == 0.4
+    assert stitch_error_px([pair("ab", 4.0)]) == 4.0
+    assert stitch_error_px([pair("ab", 0.2), pair("bc", None)]) is None
+    assert stitch_error_px([pair("ab", None, plenty=False)]) is None
+    assert stitch_error_px([]) is None
 
 
 def test_two_that_others_hold_and_that_share_little_have_no_say_in_the_stitch_error() -> None:
-    assert stitch_error_px([pair("ab", 0.2), pair("bc", 0.3), pair("ac", 2.0, plenty=False)], GATE) == 0.3
+    assert stitch_error_px([pair("ab", 0.2), pair("bc", 0.3), pair("ac", 2.0, plenty=False)]) == 0.3
 
 
 def test_of_three_in_a_row_the_neighbours_are_compared() -> None:
@@ -106,7 +103,7 @@ def test_of_three_in_a_row_the_neighbours_are_compared() -> None:
     assert max(one.error_px or 0.0 for one in agreeing) < 0.3
     apart = [*row()[:2], moved(row()[2], by=(0.2, 0.0, 0.0))]
     disagreeing = compare_pairs(PITCH, [seeing(*each) for each in zip(apart, masks, strict=True)])
-    assert stitch_error_px(disagreeing, GATE) == pytest.approx(2.0, abs=0.4)
+    assert stitch_error_px(disagreeing) == pytest.approx(2.0, abs=0.4)
 
 
 def test_what_two_cameras_share_confirms_them_where_both_find_most_of_it() -> None:

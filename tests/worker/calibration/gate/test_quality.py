@@ -9,7 +9,7 @@ from tests.worker.calibration.synthetic import PITCH, moved, pair
 from worker.calibration.detection.evidence import Evidence
 from worker.calibration.detection.view_condition import ViewCondition, ViewFigures
 from worker.calibration.diagnostics.overlap import Overlap
-from worker.calibration.gate.quality import CameraResult, Gate, Moved, alone_rejection, in_one_sentence
+from worker.calibration.gate.quality import CameraResult, Moved, alone_rejection, in_one_sentence
 from worker.calibration.geometry.camera import Pose
 from worker.calibration.refinement.uncertainty import Deviation, GroundSigma, Sigma
 
@@ -52,7 +52,7 @@ def good():
 
 
 def test_a_good_result_passes_the_gate():
-    assert alone_rejection(good(), Gate()) is None
+    assert alone_rejection(good()) is None
 
 
 @pytest.mark.parametrize(
@@ -77,20 +77,18 @@ def test_a_good_result_passes_the_gate():
     ],
 )
 def test_the_gate_names_the_cause(change, cause):
-    assert cause in alone_rejection(replace(good(), **change), Gate()).words
+    assert cause in alone_rejection(replace(good(), **change)).words
 
 
 def test_a_rejection_amid_lines_of_something_else_offers_to_list_them():
     spoiled = replace(good(), evidence=seen(0.4), overlap=Overlap(0.4, 0.9, 0.56))
-    assert "56% of what it takes for lines on the pitch lies beside" in alone_rejection(spoiled, Gate()).words
-    assert "other_markings" in alone_rejection(spoiled, Gate()).words
-    assert "other_markings" not in alone_rejection(replace(spoiled, overlap=Overlap(0.4, 0.4, 0.1)), Gate()).words
+    assert "56% of what it takes for lines on the pitch lies beside" in alone_rejection(spoiled).words
+    assert "other_markings" in alone_rejection(spoiled).words
+    assert "other_markings" not in alone_rejection(replace(spoiled, overlap=Overlap(0.4, 0.4, 0.1))).words
 
 
 def test_a_doubt_of_the_focal_length_that_moves_no_camera_rejects_none():
-    assert (
-        alone_rejection(replace(good(), zoom=ZOOMED, with_fitted_zoom=moved(LEFT, by=(0.05, 0.0, 0.0))), Gate()) is None
-    )
+    assert alone_rejection(replace(good(), zoom=ZOOMED, with_fitted_zoom=moved(LEFT, by=(0.05, 0.0, 0.0)))) is None
 
 
 def test_movement_is_told_in_degrees_metres_and_pixels():
@@ -104,8 +102,8 @@ def test_movement_is_told_in_degrees_metres_and_pixels():
 def test_a_pose_from_which_no_field_is_filmed_is_doubted_before_the_sport_is():
     hanging = LEFT.with_pose(Pose.looking_at(LEFT.pose.position, (0.0, 0.0, 0.0), roll_deg=180.0))
     lost = replace(good(), evidence=seen(0.3), overlap=Overlap(0.1, 0.1, 0.9))
-    assert "list it in the field's other_markings" in alone_rejection(lost, Gate()).words
-    words = alone_rejection(replace(lost, camera=hanging), Gate()).words
+    assert "list it in the field's other_markings" in alone_rejection(lost).words
+    words = alone_rejection(replace(lost, camera=hanging)).words
     assert "was it written in another convention" in words
     assert "other_markings" not in words
 
@@ -125,18 +123,18 @@ def test_reasons_are_joined_with_one_sign_after_each(reasons, said):
 
 def test_a_place_that_is_loose_is_accepted_where_the_markings_are_not():
     loose = replace(good(), covariance=np.diag([1e-4**2] * 3 + [1.0**2] * 3), ground_sigma=on_ground(0.1, 2.0))
-    assert alone_rejection(loose, Gate()) is None
-    told = alone_rejection(replace(good(), ground_sigma=on_ground(0.7, 2.0)), Gate())
+    assert alone_rejection(loose) is None
+    told = alone_rejection(replace(good(), ground_sigma=on_ground(0.7, 2.0)))
     assert told.reason == "undetermined"
     assert "may lie 0.70 m (2.0 px) from where it is put on the ground" in told.words
 
 
 def test_far_grass_is_known_well_enough_where_it_is_known_to_a_pixel():
-    assert alone_rejection(replace(good(), ground_sigma=on_ground(0.7, 0.4)), Gate()) is None
+    assert alone_rejection(replace(good(), ground_sigma=on_ground(0.7, 0.4))) is None
 
 
 def test_markings_that_are_loose_at_the_rim_alone_reject_no_pose():
     metres = np.where(np.arange(100) < 4, 2.0, 0.05)
     rim = GroundSigma(metres, np.full(100, 3.0))
-    assert alone_rejection(replace(good(), ground_sigma=rim), Gate()) is None
+    assert alone_rejection(replace(good(), ground_sigma=rim)) is None
     assert rim.worst(0.25, 1.0) == (0.05, 3.0, False)

@@ -14,8 +14,8 @@ def differences(of, steps):
     return np.stack(columns, axis=-1)
 
 
-def assert_alike(slopes, expected, of, within=1e-6):
-    """That slopes are what is expected but for a millionth of the largest along the axes `of`."""
-    assert slopes.shape == expected.shape
+def assert_alike(jacobian, expected, of, within=1e-6):
+    """Assert that a Jacobian is what is expected but for a millionth of the largest along the axes `of`."""
+    assert jacobian.shape == expected.shape
     if expected.size:
-        assert np.all(np.abs(slopes - expected) <= within * np.abs(expected).max(axis=of, keepdims=True))
+        assert np.all(np.abs(jacobian - expected) <= within * np.abs(expected).max(axis=of, keepdims=True))

@@ -9,7 +9,13 @@ from hypothesis import strategies as st
 
 from tests.worker.calibration.geometry.differences import assert_alike, differences
 from worker.calibration.geometry.camera import Camera, Pose, inside
-from worker.calibration.geometry.derivatives import change_between, ground_slopes, lens_slopes, moved, pixel_slopes
+from worker.calibration.geometry.derivatives import (
+    change_between,
+    ground_jacobian,
+    lens_jacobian,
+    moved,
+    pixel_jacobian,
+)
 from worker.calibration.geometry.lens import Fisheye, Intrinsics
 from worker.calibration.geometry.parameters import with_lens_changed
 
@@ -61,7 +67,7 @@ def by_pose(one, points):
 def test_pixels_move_as_they_do_after_small_changes_of_the_pose(name, x, height, target, roll):
     one = camera(name, x, height, target, roll)
     points = in_view(one)
-    assert_alike(pixel_slopes(one, points), by_pose(one, points), of=(0, 1))
+    assert_alike(pixel_jacobian(one, points), by_pose(one, points), of=(0, 1))
 
 
 @settings(max_examples=40)
@@ -70,7 +76,7 @@ def test_pixels_move_as_they_do_after_small_changes_of_the_lens(name, x, height,
     one = camera(name, x, height, target, roll)
     points = in_view(one)
     expected = differences(lambda changes: with_lens_changed(one, changes).project(points), LENS_STEPS)
-    assert_alike(lens_slopes(one, points), expected, of=(0, 1))
+    assert_alike(lens_jacobian(one, points), expected, of=(0, 1))
 
 
 @settings(max_examples=40)
@@ -87,22 +93,22 @@ def test_what_is_seen_on_the_ground_moves_as_a_pose_that_is_a_little_wrong_puts_
         start = believed.pose.position
         return (start + rays * ((points[:, 2] - start[2]) / rays[:, 2])[:, None])[:, :2]
 
-    slopes = ground_slopes(one, points)
-    np.testing.assert_allclose(slopes, differences(put, POSE_STEPS), rtol=1e-4, atol=1e-2)
+    jacobian = ground_jacobian(one, points)
+    np.testing.assert_allclose(jacobian, differences(put, POSE_STEPS), rtol=1e-4, atol=1e-2)
 
 
-def test_points_on_a_grid_have_the_slopes_that_they_have_in_a_row():
+def test_points_on_a_grid_have_the_derivatives_that_they_have_in_a_row():
     one = camera("opencv", 0.0, 10.0, 5.0, 2.0)
     points = in_view(one)[:60]
-    for slopes in (pixel_slopes, ground_slopes, lens_slopes):
-        np.testing.assert_array_equal(slopes(one, points.reshape(6, 10, 3)).reshape(60, 2, 6), slopes(one, points))
+    for jacobian in (pixel_jacobian, ground_jacobian, lens_jacobian):
+        np.testing.assert_array_equal(jacobian(one, points.reshape(6, 10, 3)).reshape(60, 2, 6), jacobian(one, points))
 
 
-def test_what_the_camera_cannot_see_has_no_slopes():
+def test_what_the_camera_cannot_see_has_no_derivatives():
     one = camera("fisheye", 0.0, 10.0, 0.0, 0.0)
     behind = np.array([[0.0, -80.0, 0.0], [0.0, -46.0, 10.0]])
-    assert np.isnan(pixel_slopes(one, behind)).all()
-    assert np.isnan(lens_slopes(one, behind)).all()
+    assert np.isnan(pixel_jacobian(one, behind)).all()
+    assert np.isnan(lens_jacobian(one, behind)).all()
 
 
 @given(lenses, aside, st.lists(st.floats(-0.5, 0.5), min_size=6, max_size=6).map(np.array))

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from tests.worker.calibration.sights import pair_observed
 from tests.worker.calibration.synthetic import CROWNED, pair, pair_frames, pair_markings
 from worker.calibration.detection.contrast import Channels
 from worker.calibration.detection.evidence import evidence_of
@@ -36,7 +37,7 @@ def test_lines_in_an_ignored_area_are_not_expected():
 
 def test_nothing_is_measured_in_an_ignored_area_and_the_rest_as_ever():
     sight = Observations([Channels([pair_frames()[0]])], [of_use(PARTLY.ignored, pair_markings()[0])])
-    whole_sight = Observations(sight.channels, [pair_markings()[0]])
+    whole_sight = pair_observed().of([0])
     (kept,) = sight.reader().measure(CROWNED.line_points(), [PARTLY], 8.0)
     (whole,) = whole_sight.reader().measure(CROWNED.line_points(), [WHOLE], 8.0)
     assert not within(kept.pixel).any()

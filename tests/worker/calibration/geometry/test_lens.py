@@ -60,7 +60,7 @@ def renumbered(lens, changes):
 def test_pixels_move_with_their_rays(lens):
     rays = in_picture(lens)
     expected = differences(lambda by: lens.distort(rays + by), np.full(2, 1e-4))
-    assert_alike(lens.slopes(rays), expected, of=(1, 2))
+    assert_alike(lens.jacobian(rays), expected, of=(1, 2))
 
 
 @given(lenses)
@@ -68,21 +68,21 @@ def test_pixels_move_with_the_numbers_of_the_lens(lens):
     rays = in_picture(lens)
     steps = np.array([1.0, 1.0, 1.0, 1e-3, 1e-5, 1e-5])
     expected = differences(lambda changes: renumbered(lens, changes).distort(rays), steps)
-    assert_alike(lens.slopes_by_numbers(rays), expected, of=(0, 1))
+    assert_alike(lens.jacobian_by_parameters(rays), expected, of=(0, 1))
 
 
 @given(fisheyes, st.floats(-300, -5), st.floats(-np.pi, np.pi))
 def test_on_its_axis_a_fisheye_is_its_matrix(lens, magnitude, turn):
     for ray in (np.zeros(2), 10**magnitude * np.array([np.cos(turn), np.sin(turn)])):
-        np.testing.assert_allclose(lens.slopes(ray), lens.matrix[:2, :2], atol=1e-6)
-        np.testing.assert_array_equal(lens.slopes_by_numbers(ray)[:, 1:3], np.eye(2))
-        np.testing.assert_allclose(lens.slopes_by_numbers(ray)[:, 4:], 0.0, atol=1e-9)
+        np.testing.assert_allclose(lens.jacobian(ray), lens.matrix[:2, :2], atol=1e-6)
+        np.testing.assert_array_equal(lens.jacobian_by_parameters(ray)[:, 1:3], np.eye(2))
+        np.testing.assert_allclose(lens.jacobian_by_parameters(ray)[:, 4:], 0.0, atol=1e-9)
 
 
 @given(lenses, st.floats(1.001, 3.0), st.floats(-np.pi, np.pi))
 def test_beyond_its_end_a_model_has_no_derivatives(lens, beyond, turn):
     ray = beyond * lens.largest_radius * np.array([np.cos(turn), np.sin(turn)])
-    for of in (lens.distort, lens.slopes, lens.slopes_by_numbers):
+    for of in (lens.distort, lens.jacobian, lens.jacobian_by_parameters):
         assert np.isnan(of(ray)).all()
 
 
@@ -92,7 +92,7 @@ def test_rays_of_any_shape_have_the_derivatives_that_each_has_alone(shape):
     matrix = np.array([[1200.0, 1.0, 960], [0, 1210, 540], [0, 0, 1]])
     full = np.array([-0.28, 0.09, 1e-3, -2e-3, 0.01, 0.02, 0, 0, 1e-3, 0, 2e-3, 0, 0.01, 0.02])
     for lens in (Intrinsics(matrix, full, SIZE), Fisheye(matrix, full[:4], SIZE)):
-        for of in (lens.slopes, lens.slopes_by_numbers):
+        for of in (lens.jacobian, lens.jacobian_by_parameters):
             assert of(rays).shape[:-2] == shape
             for at in np.ndindex(shape):
                 np.testing.assert_allclose(of(rays)[at], of(rays[at]), rtol=1e-13)

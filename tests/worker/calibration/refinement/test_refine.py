@@ -1,4 +1,4 @@
-"""The finish: line centres to a fraction of a pixel, and poses to millimetres on a perfect picture."""
+"""The refinement: line centres to a fraction of a pixel, and poses to millimetres on a perfect picture."""
 
 from functools import cache
 
@@ -7,13 +7,12 @@ import numpy as np
 import pytest
 
 from tests.scenes import lone_line
+from tests.worker.calibration.sights import observed, pair_observed
 from tests.worker.calibration.synthetic import (
     BARREL,
     CROWNED,
     ground_behind,
     moved,
-    paint_frame,
-    paint_markings,
     pair,
     pair_frames,
     pair_markings,
@@ -22,7 +21,7 @@ from worker.calibration.detection.contrast import Channels
 from worker.calibration.detection.line_matching import expected_profiles, sliding_correlation
 from worker.calibration.detection.line_measurement import LineProfiles, measure_lines
 from worker.calibration.diagnostics.registration import register_pair
-from worker.calibration.gate.quality import Gate
+from worker.calibration.gate.quality import GATE
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.parameters import free_focal_lengths, free_ridge, lens_parameters
 from worker.calibration.geometry.rotation import rotation_angles_deg
@@ -31,13 +30,9 @@ from worker.calibration.robust import huber_weights, tukey_weights
 
 pytestmark = pytest.mark.slow
 
+LEFT = pair()[0]
 SMALL_TURN = (0.0008, -0.0006, 0.0005)
 SMALL_SHIFT = (0.02, -0.03, 0.02)
-
-
-@cache
-def scene():
-    return pair(), [Channels([frame]) for frame in pair_frames()], list(pair_markings())
 
 
 def a_little_off():
@@ -46,23 +41,21 @@ def a_little_off():
 
 @cache
 def brought_back():
-    _, channels, responses = scene()
-    return refine(CROWNED, a_little_off(), Observations(channels, responses), 0.5)
+    return refine(CROWNED, a_little_off(), pair_observed(), 0.5)
 
 
 @cache
 def from_the_truth():
-    cameras, channels, responses = scene()
-    return refine(CROWNED, cameras, Observations(channels, responses), 0.5)
+    return refine(CROWNED, pair(), pair_observed(), 0.5)
 
 
 @cache
 def through_a_wrong_lens():
     """The left camera's lens is not the one that was given."""
-    cameras, channels, responses = scene()
+    cameras = pair()
     bent = next(p for p in lens_parameters(cameras) if p.name == "k1")
     wrong, _ = bent.applied(cameras, CROWNED, 0.01)
-    return refine(CROWNED, wrong, Observations(channels, responses), 0.5)
+    return refine(CROWNED, wrong, pair_observed(), 0.5)
 
 
 def off_by(cameras, refined):
@@ -75,31 +68,38 @@ def off_by(cameras, refined):
     ]
 
 
-def test_lines_are_found_where_they_are():
-    cameras, channels, responses = scene()
-    wrong = moved(cameras[0], SMALL_TURN)
-    found = measure_lines(CROWNED.line_points(), wrong, channels[0], responses[0], 6.0)
-    truth = cameras[0].project(found.points.position)
-    off = np.sum((found.pixel - truth) * found.normal, axis=1)
-    assert len(found) > 300
+def measured(one=LEFT, frame=None, network=True, search_px=6.0):
+    """The lines in the frame of the left camera near where a camera expects them, with the network or without."""
+    channels, response = pair_observed().channels[0], pair_observed().responses[0]
+    channels = channels if frame is None else Channels([frame])
+    return measure_lines(CROWNED.line_points(), one, channels, response if network else 0 * response, search_px)
+
+
+def offsets(found):
+    """How far (M,) measured lines are from where they are."""
+    return found.offset(LEFT, found.points.position)
+
+
+@pytest.mark.parametrize(
+    "found",
+    [
+        lambda: measured(moved(LEFT, SMALL_TURN)),
+        lambda: measured(network=False),
+        lambda: measured(frame=255 - pair_frames()[0], network=False),
+    ],
+    ids=["from beside", "by their ridges alone", "darker than their ground"],
+)
+def test_lines_are_found_where_they_are(found):
+    off = offsets(found())
+    assert len(off) > 300
     assert np.abs(np.median(off)) < 0.02
     assert np.percentile(np.abs(off), 75) < 0.1
 
 
-def test_lines_that_the_network_misses_are_measured_by_their_ridges():
-    cameras, channels, responses = scene()
-    found = measure_lines(CROWNED.line_points(), cameras[0], channels[0], np.zeros_like(responses[0]), 6.0)
-    truth = cameras[0].project(found.points.position)
-    assert len(found) > 300
-    assert np.abs(np.median(np.sum((found.pixel - truth) * found.normal, axis=1))) < 0.02
-
-
 def test_where_a_line_is_measured_does_not_depend_on_where_it_is_expected():
-    cameras, channels, responses = scene()
-    lines, here = CROWNED.line_points(), cameras[0]
-    beside = moved(here, SMALL_TURN)
-    profiles = LineProfiles.read(lines, here, channels[0], responses[0], 12.0)
-    one, other = (profiles.measure(camera, lines, 5.0) for camera in (here, beside))
+    lines, beside = CROWNED.line_points(), moved(LEFT, SMALL_TURN)
+    profiles = LineProfiles.read(lines, LEFT, pair_observed().channels[0], pair_observed().responses[0], 12.0)
+    one, other = (profiles.measure(camera, lines, 5.0) for camera in (LEFT, beside))
     _, at_one, at_other = np.intersect1d(one.index, other.index, return_indices=True)
     assert len(at_one) > 300
     apart = np.linalg.norm(one.pixel[at_one] - other.pixel[at_other], axis=1)
@@ -108,20 +108,8 @@ def test_where_a_line_is_measured_does_not_depend_on_where_it_is_expected():
 
 
 def test_ridges_that_do_not_go_on_along_a_line_are_not_measured():
-    cameras, channels, responses = scene()
-    noise = np.random.default_rng(3).normal(100, 20, (*responses[0].shape, 3)).astype(np.uint8)
-    found = measure_lines(CROWNED.line_points(), cameras[0], Channels([noise]), np.zeros_like(responses[0]), 6.0)
-    seen = measure_lines(CROWNED.line_points(), cameras[0], channels[0], responses[0], 6.0)
-    assert len(found) < 0.2 * len(seen)
-
-
-def test_lines_darker_than_their_ground_are_measured_where_they_are():
-    cameras, _, responses = scene()
-    negative = 255 - pair_frames()[0]
-    found = measure_lines(CROWNED.line_points(), cameras[0], Channels([negative]), np.zeros_like(responses[0]), 6.0)
-    truth = cameras[0].project(found.points.position)
-    assert len(found) > 300
-    assert np.abs(np.median(np.sum((found.pixel - truth) * found.normal, axis=1))) < 0.02
+    noise = np.random.default_rng(3).normal(100, 20, pair_frames()[0].shape).astype(np.uint8)
+    assert len(measured(frame=noise, network=False)) < 0.2 * len(measured())
 
 
 @pytest.mark.parametrize("shift", [-3.25, 0.0, 1.5])
@@ -144,16 +132,16 @@ def test_slightly_moved_cameras_come_back_to_where_they_were():
 
 
 def test_where_it_ends_does_not_depend_on_where_it_began():
-    cameras, channels, responses = scene()
-    start = [moved(c, (-0.0005, 0.0008, 0)) for c in cameras]
-    other = refine(CROWNED, start, Observations(channels, responses), 0.5)
+    start = [moved(c, (-0.0005, 0.0008, 0)) for c in pair()]
+    other = refine(CROWNED, start, pair_observed(), 0.5)
     for shift, turn in off_by(brought_back().cameras, other.cameras):
         assert shift < 0.002
         assert turn < 0.001
 
 
 def test_the_error_is_of_the_size_of_its_sigma():
-    cameras, _, responses = scene()
+    cameras = pair()
+    responses = pair_markings()
     rng = np.random.default_rng(0)
     noisy = [np.clip(f + rng.normal(scale=12, size=f.shape), 0, 255).astype(np.uint8) for f in pair_frames()]
     refined = refine(CROWNED, cameras, Observations([Channels([f]) for f in noisy], responses), 0.5)
@@ -164,22 +152,18 @@ def test_the_error_is_of_the_size_of_its_sigma():
 
 
 def test_the_stitch_term_holds_together_what_a_wrong_lens_pulls_apart():
-    cameras, channels, responses = scene()
+    cameras = pair()
+    responses = pair_markings()
     longer, _ = free_focal_lengths(cameras)[0].applied(cameras, CROWNED, 2.0)
     alone, together = (
-        register_pair(CROWNED, *refine(CROWNED, longer, Observations(channels, responses), weight).cameras, *responses)
+        register_pair(CROWNED, *refine(CROWNED, longer, pair_observed(), weight).cameras, *responses)
         for weight in (0.0, 0.9)
     )
     assert together.error_px < 0.6 * alone.error_px
 
 
 def test_cameras_that_need_not_agree_end_as_each_does_by_itself():
-    cameras, channels, responses = scene()
-    stored, begun, sight = (
-        [moved(c, by=(0.3, 0.0, 0.0)) for c in cameras],
-        a_little_off(),
-        Observations(channels, responses),
-    )
+    stored, begun, sight = [moved(c, by=(0.3, 0.0, 0.0)) for c in pair()], a_little_off(), pair_observed()
     together = refine(CROWNED, begun, sight, 0.0, stored=stored)
     for n, end in enumerate(together.each):
         alone = refine(CROWNED, [begun[n]], sight.of([n]), 0.0, stored=[stored[n]])
@@ -189,7 +173,8 @@ def test_cameras_that_need_not_agree_end_as_each_does_by_itself():
 
 
 def test_a_camera_without_lines_stays_where_it_is_and_has_no_sigma():
-    cameras, channels, responses = scene()
+    cameras = pair()
+    channels, responses = pair_observed().channels, pair_observed().responses
     black = Channels([np.zeros((*responses[1].shape, 3), dtype=np.uint8)])
     blind = Observations([channels[0], black], [responses[0], np.zeros_like(responses[1])])
     refined = refine(CROWNED, cameras, blind, 0.5)
@@ -200,9 +185,8 @@ def test_a_camera_without_lines_stays_where_it_is_and_has_no_sigma():
 
 
 def test_assessing_moves_nothing():
-    cameras, channels, responses = scene()
-    start = [moved(c, SMALL_TURN) for c in cameras]
-    assessed = evaluate_poses(CROWNED, start, Observations(channels, responses))
+    start = [moved(c, SMALL_TURN) for c in pair()]
+    assessed = evaluate_poses(CROWNED, start, pair_observed())
     assert assessed.cameras == start
     assert all(one.residual_px > 0.3 for one in assessed.each)
 
@@ -217,28 +201,24 @@ def test_an_outlier_has_no_weight_and_the_rest_have_theirs():
 @pytest.mark.parametrize("distortion", [(), BARREL])
 def test_a_lone_touchline_neither_lets_a_camera_run_away_nor_makes_it_sure(distortion):
     one = lone_line(distortion)
-    sight = Observations([Channels([paint_frame(CROWNED, one)])], [paint_markings(CROWNED, one)])
-    refined = refine(CROWNED, [moved(one, by=(0.2, 0.0, 0.0))], sight, 0.5)
+    refined = refine(CROWNED, [moved(one, by=(0.2, 0.0, 0.0))], observed(CROWNED, [one]), 0.5)
     assert refined.each[0].residual_px is not None
     assert np.linalg.norm(refined.cameras[0].pose.position - one.pose.position) < 1.5
-    assert refined.each[0].sigma.position_m > Gate().largest_ground_sigma_m
+    assert refined.each[0].sigma.position_m > GATE.largest_ground_sigma_m
 
 
 @pytest.mark.parametrize("colour", [0, 2])
 def test_blue_and_red_that_the_lens_puts_elsewhere_move_no_line(colour):
-    one, frame = pair()[0], pair_frames()[0]
-    fringed = frame.copy()
-    fringed[:, 4:, colour] = frame[:, :-4, colour]
-    lines, response = CROWNED.line_points(), pair_markings()[0]
-    here, there = (measure_lines(lines, one, Channels([f]), response, 6.0) for f in (frame, fringed))
-    np.testing.assert_array_equal(here.pixel, there.pixel)
+    fringed = pair_frames()[0].copy()
+    fringed[:, 4:, colour] = pair_frames()[0][:, :-4, colour]
+    np.testing.assert_array_equal(measured().pixel, measured(frame=fringed).pixel)
 
 
 def test_the_end_is_the_same_from_both_sides_where_the_model_is_wrong():
-    cameras, channels, responses = scene()
+    cameras = pair()
     wrong = Field(CROWNED.length, CROWNED.width, CROWNED.line_width, CROWNED.ridge + [0.0, 0.0, 0.3])
     ends = [
-        refine(wrong, [moved(c, turn, shift) for c in cameras], Observations(channels, responses), 0.5).cameras
+        refine(wrong, [moved(c, turn, shift) for c in cameras], pair_observed(), 0.5).cameras
         for turn, shift in ((SMALL_TURN, SMALL_SHIFT), (tuple(-np.array(SMALL_TURN)), tuple(-np.array(SMALL_SHIFT))))
     ]
     for shift, turn in off_by(*ends):
@@ -253,10 +233,10 @@ def test_huber_believes_what_is_near_and_doubts_the_rest_the_more_the_farther():
 
 
 def test_a_focal_length_that_is_left_free_is_found_with_the_pose():
-    cameras, channels, responses = scene()
+    cameras = pair()
     longer, _ = free_focal_lengths(cameras)[0].applied(cameras, CROWNED, 1.5)
     start = [moved(c, SMALL_TURN, SMALL_SHIFT) for c in longer]
-    found = refine(CROWNED, start, Observations(channels, responses), 0.5, free_focal_lengths(start))
+    found = refine(CROWNED, start, pair_observed(), 0.5, free_focal_lengths(start))
     for true, after in zip(cameras, found.cameras, strict=True):
         assert after.intrinsics.matrix[0, 0] == pytest.approx(true.intrinsics.matrix[0, 0], abs=0.2)
         assert np.linalg.norm(after.pose.position - true.pose.position) < 0.02
@@ -265,9 +245,8 @@ def test_a_focal_length_that_is_left_free_is_found_with_the_pose():
 
 @pytest.mark.parametrize("start", [0.1, 0.5])
 def test_a_ridge_that_is_left_free_is_found_with_the_poses(start):
-    cameras, channels, responses = scene()
     wrong = CROWNED.raised(start - 0.35)
-    found = refine(wrong, cameras, Observations(channels, responses), 0.5, free_ridge(wrong))
+    found = refine(wrong, pair(), pair_observed(), 0.5, free_ridge(wrong))
     assert found.pitch.ridge[:, 2] == pytest.approx([0.35, 0.35], abs=0.03)
 
 
@@ -280,11 +259,7 @@ def test_a_ground_that_swells_is_found_and_does_not_move_the_cameras():
         return height(xy) + bumps[0] * np.sin(xy[..., 0] / 6) * np.cos(xy[..., 1] / 6)
 
     object.__setattr__(uneven, "height", swelling)
-    sight = Observations(
-        [Channels([paint_frame(uneven, c)]) for c in cameras],
-        [paint_markings(uneven, c) for c in cameras],
-    )
-    refined = refine(CROWNED, cameras, sight, 0.5)
+    refined = refine(CROWNED, cameras, observed(uneven, cameras), 0.5)
     for (shift, turn), one in zip(off_by(cameras, refined.cameras), refined.each, strict=True):
         assert shift < 0.05
         assert turn < 0.05
@@ -309,8 +284,7 @@ def test_a_lens_and_a_field_that_are_right_are_not_suspected():
 
 
 def test_lines_tell_that_the_pitch_is_crowned_though_it_is_said_to_be_flat():
-    cameras, channels, responses = scene()
-    refined = refine(CROWNED.flat(), cameras, Observations(channels, responses), 0.5)
+    refined = refine(CROWNED.flat(), pair(), pair_observed(), 0.5)
     found = deviation(refined, None, "ridge_height_m")
     assert found.value == pytest.approx(0.35, abs=max(3 * found.sigma, 0.1))
     assert found.value > 3 * found.sigma
@@ -326,27 +300,21 @@ def test_the_same_wrong_lens_makes_the_next_pose_no_less_like_this_one():
     assert left.repeatability.position_m < left.sigma.position_m / 2
 
 
-def offsets(found, one):
-    """How far (M,) measured lines are from where they are."""
-    return np.sum((found.pixel - one.project(found.points.position)) * found.normal, axis=1)
+def on_marking(found, name):
+    return np.array([marking.name for marking in CROWNED.markings()])[found.points.marking] == name
 
 
 def test_bent_lines_are_found_where_they_are():
-    cameras, channels, responses = scene()
-    found = measure_lines(CROWNED.line_points(), cameras[0], channels[0], responses[0], 3.0)
-    names = np.array([marking.name for marking in CROWNED.markings()])[found.points.marking]
+    found = measured(search_px=3.0)
     for name in ("centre circle", "left penalty arc"):
         # Along a straight tangent the arc would be 0.3 px off.
-        assert abs(np.median(offsets(found, cameras[0])[names == name])) < 0.08
+        assert abs(np.median(offsets(found)[on_marking(found, name)])) < 0.08
 
 
 def test_ground_that_is_brighter_on_one_side_does_not_pull_a_line():
-    cameras, _, responses = scene()
     with np.errstate(invalid="ignore"):
-        outside = ground_behind(CROWNED, cameras[0])[..., 1] < -CROWNED.width / 2
-    lit = cv2.add(pair_frames()[0], 40 * np.dstack([outside] * 3).astype(np.uint8))
-    found = measure_lines(CROWNED.line_points(), cameras[0], Channels([lit]), responses[0], 3.0)
-    names = np.array([marking.name for marking in CROWNED.markings()])[found.points.marking]
-    beside = offsets(found, cameras[0])[names == "near touchline"]
+        outside = ground_behind(CROWNED, LEFT)[..., 1] < -CROWNED.width / 2
+    found = measured(frame=cv2.add(pair_frames()[0], 40 * np.dstack([outside] * 3).astype(np.uint8)), search_px=3.0)
+    beside = offsets(found)[on_marking(found, "near touchline")]
     assert len(beside) > 30
     assert abs(np.median(beside)) < 0.05

@@ -44,7 +44,7 @@ def test_errors_as_large_as_expected_spread_poses_as_far_as_is_said():
     for trial in range(TRIALS):
         off = rng.normal(scale=exact.sigma_px)[:, None] * exact.normal
         found = [replace(exact, pixel=exact.pixel + off)]
-        here = replace(Estimate.at(court, [one], unknowns), uneven_m=EVEN_M)
+        here = replace(Estimate.initial(court, [one], unknowns), uneven_m=EVEN_M)
         for _ in range(4):
             here = gauss_newton_step(here, [one], found, unknowns, tukey_weights).to
         errors.append(here.cameras[0].pose.position - one.pose.position)
@@ -65,7 +65,7 @@ def said_of_a_corner(sigma_from=None, **sigma):
     one = one.with_lens(replace(one.intrinsics, sigma=sigma, sigma_from=sigma_from))
     lines = court.line_points()
     unknowns = Unknowns(1, [], Ground.under(lines))
-    here = replace(Estimate.at(court, [one], unknowns), uneven_m=EVEN_M)
+    here = replace(Estimate.initial(court, [one], unknowns), uneven_m=EVEN_M)
     before = [moved(one, by=(0.0, -2.0, 1.0))]
     (said,) = estimate_uncertainty(here, before, [None], [measured(lines, one)], [NO_EVIDENCE], unknowns).each
     return said.sigma.position_m
@@ -118,7 +118,7 @@ def test_a_pose_that_was_found_through_a_lens_is_no_witness_of_that_lens(too_lon
     given = with_focal_length(real, too_long * 1000.0)
     lines, unknowns = pitch.line_points(), Unknowns(1, [], Ground.under(pitch.line_points()))
     found = replace(measured(lines, real), misfit_px=0.2)
-    here = replace(Estimate.at(pitch, [given], unknowns), uneven_m=EVEN_M)
+    here = replace(Estimate.initial(pitch, [given], unknowns), uneven_m=EVEN_M)
     for _ in range(12):
         here = gauss_newton_step(here, [given], [found], unknowns, huber_weights).to
     (there,), memory = here.cameras, None

@@ -40,11 +40,15 @@ def found(pitch_name, truth_name, lens_is_known, place=None):
     return pitch, truth, search(pitch, truth, paint_frame(pitch, truth), lens_is_known, place or Place())
 
 
+def response_to(frame):
+    height, width = frame.shape[:2]
+    return white_on_green(frame, [Region(0, 0, width, height)]).astype(np.float32) / 255
+
+
 def search(pitch, truth, frame, lens_is_known=True, place=Place(), sureness=1.0):  # noqa: B008  (frozen)
     lenses = [SoughtLens.known(truth.intrinsics)] if lens_is_known else unknown_lenses(truth.intrinsics.size)
-    response = white_on_green(frame, [Region(0, 0, *truth.intrinsics.size)]).astype(np.float32) / 255 * sureness
     sought = SoughtCamera(truth.id, lenses, place)
-    return relocalise(pitch, FieldMap.of(pitch), sought, Channels([frame]), response, 1)
+    return relocalise(pitch, FieldMap.of(pitch), sought, Channels([frame]), response_to(frame) * sureness, 1)
 
 
 def off_px(pitch, truth, best):
@@ -82,25 +86,22 @@ def test_lens_and_pose_are_found_together():
 
 def test_a_lens_that_bends_much_more_than_usual_ones_is_found_with_the_pose():
     barrel = camera("one", (-6.0, -52.0, 16.0), (-10.0, 0.0), distortion=(-0.25, 0.06, 0.0, 0.0))
-    size = barrel.intrinsics.size
-    response = white_on_green(paint_frame(PITCH, barrel), [Region(0, 0, *size)]).astype(np.float32) / 255
+    size, frame = barrel.intrinsics.size, paint_frame(PITCH, barrel)
     sought = SoughtCamera("one", unknown_lenses(size), other_lenses=unknown_lenses(size, OTHER_BENDS))
-    channels = Channels([paint_frame(PITCH, barrel)])
-    answer = relocalise(PITCH, FieldMap.of(PITCH), sought, channels, response, 1)
+    answer = relocalise(PITCH, FieldMap.of(PITCH), sought, Channels([frame]), response_to(frame), 1)
     assert answer.refusal is None, answer.refusal
     assert off_px(PITCH, barrel, answer.candidates[0].camera) < 1.0
 
 
 def test_other_lenses_are_looked_through_where_the_first_find_nothing():
     # A lens of half the focal length explains no line of the frame.
-    _, truth, _ = found("football", "SIDELINE", lens_is_known=True)
-    frame = paint_frame(PITCH, truth)
-    response = white_on_green(frame, [Region(0, 0, *truth.intrinsics.size)]).astype(np.float32) / 255
-    wide = replace(truth.intrinsics, matrix=np.diag([0.3, 0.3, 1.0]) @ truth.intrinsics.matrix)
+    frame, lens = paint_frame(PITCH, SIDELINE), SIDELINE.intrinsics
+    wide = replace(lens, matrix=np.diag([0.3, 0.3, 1.0]) @ lens.matrix)
     alone = SoughtCamera("one", [SoughtLens.known(wide)])
-    with_other = replace(alone, other_lenses=[SoughtLens.known(truth.intrinsics)])
+    with_other = replace(alone, other_lenses=[SoughtLens.known(lens)])
     answers = [
-        relocalise(PITCH, FieldMap.of(PITCH), one, Channels([frame]), response, 1) for one in (alone, with_other)
+        relocalise(PITCH, FieldMap.of(PITCH), one, Channels([frame]), response_to(frame), 1)
+        for one in (alone, with_other)
     ]
     assert answers[0].refusal is not None
     assert answers[1].refusal is None
@@ -201,38 +202,26 @@ def test_a_pose_whose_lines_the_network_does_not_see_is_not_taken():
     assert "12%" in refusals[0].words
 
 
-def test_a_pose_that_misses_more_and_explains_nothing_of_its_own_is_no_rival():
-    # American football: the same field a few yard lines farther on, with its goal line where there is none.
-    best, shifted = candidate(99, range(90), iou=0.91), candidate(90, range(88), iou=0.81)
-    assert not explains_nearly_as_well(shifted, best)
-
-
-def test_a_pose_that_explains_paint_that_the_best_does_not_is_a_rival():
-    best, other = candidate(99, range(90), iou=0.91), candidate(90, range(5, 93), iou=0.81)
-    assert explains_nearly_as_well(other, best)
-
-
-def test_a_pose_is_no_rival_of_one_that_explains_all_that_it_does_and_more():
-    # Tennis: a court half as far along, whose expected lines are rather seen, but whose paint is a third of nothing.
-    best, shifted = candidate(76, range(95), iou=0.62), candidate(85, range(68), iou=0.71)
-    assert not explains_nearly_as_well(shifted, best)
-    # American football: yard lines farther on, with less of its lines seen and less of the paint explained.
-    best, shifted = candidate(96, range(99), iou=0.85), candidate(93, range(92), iou=0.78)
-    assert not explains_nearly_as_well(shifted, best)
-
-
-def test_a_pose_is_no_rival_of_one_that_explains_the_same_and_sees_more_of_its_lines():
-    # American football: yard lines farther on, one of them where there is none.
-    best, shifted = candidate(95, range(98), iou=0.86), candidate(88, range(98), iou=0.78)
-    assert not explains_nearly_as_well(shifted, best)
-    alike = candidate(93, range(98), iou=0.84)
-    assert explains_nearly_as_well(alike, best)
-
-
-def test_a_pose_that_explains_no_more_and_whose_lines_lie_clearly_farther_off_is_no_rival():
-    # American football through a lens that is sought: it bends to meet the yard lines farther on, and does not quite.
-    best = candidate(99, range(96), iou=0.88, residual_px=0.17)
-    assert explains_nearly_as_well(candidate(99, range(5, 97), iou=0.89, residual_px=0.2), best)
-    assert not explains_nearly_as_well(candidate(99, range(5, 97), iou=0.89, residual_px=0.55), best)
-    # One of which too little was measured may be the true one.
-    assert explains_nearly_as_well(candidate(99, range(5, 97), iou=0.89, residual_px=None), best)
+@pytest.mark.parametrize(
+    ("best", "other", "is_rival"),
+    [
+        # American football: the same field a few yard lines farther on, with its goal line where there is none.
+        ((99, range(90), 0.91), (90, range(88), 0.81), False),
+        # It explains paint that the best does not.
+        ((99, range(90), 0.91), (90, range(5, 93), 0.81), True),
+        # Tennis: a court half as far along, whose lines are rather seen, but which explains a third less of the paint.
+        ((76, range(95), 0.62), (85, range(68), 0.71), False),
+        # American football: yard lines farther on, with less of its lines seen and less of the paint explained.
+        ((96, range(99), 0.85), (93, range(92), 0.78), False),
+        # Yard lines farther on, one of them where there is none; and as many of its lines.
+        ((95, range(98), 0.86), (88, range(98), 0.78), False),
+        ((95, range(98), 0.86), (93, range(98), 0.84), True),
+        # Through a lens that is sought, which bends to meet the yard lines farther on, and does not quite.
+        ((99, range(96), 0.88, 0.17), (99, range(5, 97), 0.89, 0.2), True),
+        ((99, range(96), 0.88, 0.17), (99, range(5, 97), 0.89, 0.55), False),
+        # Too little of it was measured.
+        ((99, range(96), 0.88, 0.17), (99, range(5, 97), 0.89, None), True),
+    ],
+)
+def test_a_pose_is_a_rival_if_it_may_be_the_true_one(best, other, is_rival):
+    assert explains_nearly_as_well(candidate(*other), candidate(*best)) == is_rival

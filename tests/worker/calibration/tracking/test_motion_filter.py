@@ -17,7 +17,7 @@ def filtered(changes, rng=None):
     steps = [FilterStep(0.0, last)]
     for change in changes:
         seen = change if rng is None else change + rng.normal(0, NOISE)
-        expected = last.after(FRAME_S).drawn_back(FRAME_S)
+        expected = last.after(FRAME_S).with_mast_prior(FRAME_S)
         last = expected.with_observed(PoseObservation(seen, INFORMATION))
         steps.append(FilterStep(FRAME_S, last))
     return steps
@@ -37,7 +37,7 @@ def swinging(count):
 
 def test_a_rig_that_stands_still_stays_still_within_its_sigma():
     steps = filtered(np.zeros((500, 6)), np.random.default_rng(1))
-    assert in_sigmas([step.known for step in steps[50:]], np.zeros((451, 6))) < 1.0
+    assert in_sigmas([step.state for step in steps[50:]], np.zeros((451, 6))) < 1.0
     calm = np.std([state.change for state in smoothed(steps)[50:-50]], axis=0)
     assert np.all(calm < 0.8 * NOISE)
 
@@ -45,7 +45,7 @@ def test_a_rig_that_stands_still_stays_still_within_its_sigma():
 def test_a_swinging_rig_is_followed_within_its_sigma():
     changes = swinging(500)
     steps = filtered(changes, np.random.default_rng(2))
-    known = [step.known for step in steps[50:]]
+    known = [step.state for step in steps[50:]]
     assert in_sigmas(known, changes[49:]) < 1.1
     errors = np.array([state.change for state in known]) - changes[49:]
     assert np.all(np.sqrt(np.mean(errors**2, axis=0)) < NOISE)
@@ -53,7 +53,7 @@ def test_a_swinging_rig_is_followed_within_its_sigma():
 
 def test_what_goes_on_as_it_went_is_followed_without_a_lag():
     changes = RATE * FRAME_S * np.arange(1, 51)[:, None]
-    last = filtered(changes)[-1].known
+    last = filtered(changes)[-1].state
     assert np.all(np.abs(last.change - changes[-1]) < 0.1 * NOISE)
     np.testing.assert_allclose(last.mean[6:], RATE, rtol=0.02)
 
@@ -63,30 +63,31 @@ def test_who_sees_what_comes_later_knows_more():
     steps = filtered(changes, np.random.default_rng(3))
     later = smoothed(steps)
     for step, state in zip(steps, later, strict=True):
-        assert np.all(np.diag(state.covariance) <= np.diag(step.known.covariance) * (1 + 1e-9))
+        assert np.all(np.diag(state.covariance) <= np.diag(step.state.covariance) * (1 + 1e-9))
     error, error_then = (
         np.mean(np.square([state.change - change for state, change in zip(states[1:], changes, strict=True)]))
-        for states in (later, [step.known for step in steps])
+        for states in (later, [step.state for step in steps])
     )
     assert error < 0.8 * error_then
-    np.testing.assert_array_equal(later[-1].mean, steps[-1].known.mean)
+    np.testing.assert_array_equal(later[-1].mean, steps[-1].state.mean)
 
 
 def test_surprise_is_as_large_as_chance_has_it_and_a_jump_exceeds_the_gate():
     rng = np.random.default_rng(4)
-    state = filtered(np.zeros((50, 6)))[-1].known.after(FRAME_S)
+    state = filtered(np.zeros((50, 6)))[-1].state.after(FRAME_S)
     spread = np.linalg.cholesky(state.change_covariance + np.diag(NOISE**2))
     found = [
-        state.surprise(PoseObservation(state.change + spread @ rng.normal(size=6), INFORMATION)) for _ in range(2000)
+        state.squared_innovation(PoseObservation(state.change + spread @ rng.normal(size=6), INFORMATION))
+        for _ in range(2000)
     ]
     assert np.mean(found) == pytest.approx(6, rel=0.1)
     assert max(found) < GATE
     jump = np.radians([0.5, 0, 0, 0, 0, 0])
-    assert state.surprise(PoseObservation(state.change + jump, INFORMATION)) > GATE
+    assert state.squared_innovation(PoseObservation(state.change + jump, INFORMATION)) > GATE
 
 
 def test_a_direction_of_which_nothing_is_seen_stays_as_it_was():
-    state = filtered(np.zeros((50, 6)))[-1].known.after(FRAME_S)
+    state = filtered(np.zeros((50, 6)))[-1].state.after(FRAME_S)
     blind = INFORMATION.copy()
     blind[4] = blind[:, 4] = 0
     known = state.with_observed(PoseObservation(np.full(6, 1e-4), blind))
@@ -101,10 +102,10 @@ def test_a_reference_that_hardly_any_line_holds_is_known_as_little():
 
 
 def test_a_rig_that_is_not_seen_for_long_is_somewhere_about_its_reference():
-    state = filtered(swinging(100))[-1].known
+    state = filtered(swinging(100))[-1].state
     sigmas = []
     for _ in range(100):
-        state = state.after(FRAME_S).drawn_back(FRAME_S)
+        state = state.after(FRAME_S).with_mast_prior(FRAME_S)
         sigmas.append(np.sqrt(np.diag(state.change_covariance)))
     assert np.all(sigmas[12] > 10 * NOISE)
     assert np.all(np.degrees(sigmas[-1][:3]) < 1.5)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tests.worker.calibration.synthetic import CROWNED, pair
-from worker.calibration.geometry.derivatives import pixel_slopes
+from worker.calibration.geometry.derivatives import pixel_jacobian
 from worker.calibration.geometry.visibility import VisibleLines
 from worker.calibration.tracking.telling_pieces import most_telling
 
@@ -14,30 +14,30 @@ def pieces():
     """What the left camera sees of the pitch: how pieces move with its pose, and the ten metres that each is of."""
     camera = pair()[0]
     seen = VisibleLines.from_camera(CROWNED.line_points(), camera)
-    slopes = np.einsum("mij,mi->mj", pixel_slopes(camera, seen.points.position), seen.normal)
-    return slopes, seen.index // 40, seen.pixel
+    jacobian = np.einsum("mij,mi->mj", pixel_jacobian(camera, seen.points.position), seen.normal)
+    return jacobian, seen.index // 40, seen.pixel
 
 
-def sigmas(slopes):
-    return np.sqrt(np.diag(np.linalg.inv(PRIOR + slopes.T @ slopes)))
+def sigmas(jacobian):
+    return np.sqrt(np.diag(np.linalg.inv(PRIOR + jacobian.T @ jacobian)))
 
 
 def test_they_say_more_than_as_many_that_were_taken_at_even_distances():
-    slopes, patch, _ = pieces()
-    chosen = most_telling(slopes, patch, PRIOR, 60)
-    even = np.linspace(0, len(slopes) - 1, 60).astype(int)
+    jacobian, patch, _ = pieces()
+    chosen = most_telling(jacobian, patch, PRIOR, 60)
+    even = np.linspace(0, len(jacobian) - 1, 60).astype(int)
     assert len(np.unique(chosen)) == 60
-    assert (sigmas(slopes[chosen]) < sigmas(slopes[even])).all()
+    assert (sigmas(jacobian[chosen]) < sigmas(jacobian[even])).all()
 
 
 def test_they_lie_in_most_places_that_have_lines():
-    slopes, patch, pixel = pieces()
-    chosen = most_telling(slopes, patch, PRIOR, 200)
+    jacobian, patch, pixel = pieces()
+    chosen = most_telling(jacobian, patch, PRIOR, 200)
     counts = np.bincount(np.unique(patch, return_inverse=True)[1][chosen])
     assert np.mean(counts > 0) > 0.8
     assert np.ptp(pixel[chosen], axis=0) @ [1, 1] > 0.95 * np.ptp(pixel, axis=0) @ [1, 1]
 
 
 def test_where_there_are_fewer_all_of_them_are_taken():
-    slopes, patch, _ = pieces()
-    assert most_telling(slopes[:7], patch[:7], PRIOR, 60).tolist() == list(range(7))
+    jacobian, patch, _ = pieces()
+    assert most_telling(jacobian[:7], patch[:7], PRIOR, 60).tolist() == list(range(7))
