@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 
 from service import build
+from service.schemas.options import Options
+from service.schemas.results import CameraResult, Result
 from service.settings import setting_names
 from service.variable_names import unread
 from tests import settings_page
@@ -18,6 +20,8 @@ ROOT = Path(__file__).parents[1]
 OPERATIONS = ROOT / "docker" / "README.md"
 SIZING = ROOT / "docs" / "sizing.md"
 SETTINGS = ROOT / "docs" / "settings.md"
+GLOSSARY = ROOT / "docs" / "glossary.md"
+INDEX = ROOT / "docs" / "README.md"
 DOCUMENTS = [
     *(
         ROOT / name
@@ -36,6 +40,8 @@ DOCUMENTS = [
 # The changelog tells what earlier versions said.
 OF_TODAY = [path for path in DOCUMENTS if path.name != "CHANGELOG.md"]
 INSTALL = re.compile(r"\bpip install ([^`#\n|]+)")
+# Fields of calibrations that need no entry in the glossary.
+EXPLAINED_BY_THEIR_NAMES = {"id", "cameras", "pictures", "callback_url", "timeout_s"}
 # What others publish, and pages tell readers to install.
 OF_OTHERS = {"pycolmap"}
 
@@ -121,3 +127,23 @@ def test_no_document_and_no_file_of_operators_speaks_of_a_variable_that_a_start_
 
 def test_the_figures_of_the_sizing_page_are_those_that_its_command_prints():
     assert sizing.tables() in SIZING.read_text()
+
+
+def test_the_index_lists_every_page():
+    linked = set(re.findall(r"\]\(([a-z-]+\.md)\)", INDEX.read_text()))
+    assert linked == {path.name for path in (ROOT / "docs").glob("*.md")} - {INDEX.name}
+
+
+def glossary_entries():
+    return re.findall(r"^- \*\*(.+?)\*\*: .", GLOSSARY.read_text(), re.MULTILINE)
+
+
+def test_the_glossary_is_in_alphabetical_order():
+    entries = [re.sub(r"[`,]", "", entry).lower() for entry in glossary_entries()]
+    assert entries == sorted(entries)
+
+
+@pytest.mark.parametrize("model", [CameraResult, Result, Options])
+def test_the_glossary_explains_every_field_of_calibrations(model):
+    words = set(re.findall(r"`(\w+)`", GLOSSARY.read_text()))
+    assert set(model.model_fields) - EXPLAINED_BY_THEIR_NAMES <= words

@@ -11,7 +11,7 @@ from service.schemas.names import EVENT_KINDS
 ROOT = Path(__file__).parents[3]
 PAGE = (ROOT / "service" / "pages" / "static" / "follow.js").read_text()
 CLIENT = (ROOT / "client" / "esc_client" / "__init__.py").read_text()
-DOCUMENT = (ROOT / "docs" / "long-life.md").read_text()
+DOCUMENT = (ROOT / "docs" / "events.md").read_text()
 # Every stream begins with it, whatever was asked for.
 BEGINNING = "poses.current"
 
