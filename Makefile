@@ -15,7 +15,7 @@ $(VENV)/.installed: requirements.lock pyproject.toml
 	touch $@
 
 demo: setup
-	$(BIN)/python -m tests.demo
+	$(BIN)/python -m demo
 
 # Compiled files are kept even where the machine says not to: each of hundreds of processes would compile them anew.
 PYTEST := PYTHONDONTWRITEBYTECODE= $(BIN)/pytest --numprocesses=auto --dist=worksteal
@@ -41,7 +41,7 @@ check: setup
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
-	$(BIN)/mypy --config-file tests/benchmarks/mypy.ini
+	$(BIN)/mypy --config-file benchmarks/mypy.ini
 	$(BIN)/lint-imports
 	$(BIN)/deptry .
 	$(BIN)/python -m tests.openapi
@@ -52,38 +52,38 @@ wheel: setup
 	$(BIN)/pip wheel --quiet --disable-pip-version-check --no-deps --no-build-isolation --wheel-dir dist . ./client
 
 bench-real: setup
-	$(BIN)/python -m tests.benchmarks.real_pair
-	$(BIN)/python -m tests.benchmarks.seam
+	$(BIN)/python -m benchmarks.real_pair
+	$(BIN)/python -m benchmarks.seam
 
 # One BLAS thread, as the worker sets it.
 bench-fields: setup
-	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.fields
+	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks.fields
 
 # One BLAS thread, as the worker sets it.
 bench-find: setup
-	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.find
+	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks.find
 
 # One BLAS thread, as the worker sets it.
 bench-knocked: setup
-	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.knocked
+	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks.knocked
 
 # Needs GStreamer's RTSP server, as CONTRIBUTING.md says.
 bench-live: setup
-	$(BIN)/python -m tests.benchmarks.live
+	$(BIN)/python -m benchmarks.live
 
 bench-segmentation: $(VENV)/.train
-	$(BIN)/python -m tests.benchmarks.segmentation
+	$(BIN)/python -m benchmarks.segmentation
 
 bench-service: setup
-	$(BIN)/python -m tests.benchmarks.service
+	$(BIN)/python -m benchmarks.service
 
 # SECONDS: how long each fault lasts.
 SECONDS ?= 20
 bench-faults: setup
-	$(BIN)/python -m tests.benchmarks.faults --seconds $(SECONDS)
+	$(BIN)/python -m benchmarks.faults --seconds $(SECONDS)
 
 bench-hostile: setup
-	$(BIN)/python -m tests.benchmarks.hostile
+	$(BIN)/python -m benchmarks.hostile
 
 $(VENV)/.bench: $(VENV)/.installed
 	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[bench]'
@@ -91,37 +91,37 @@ $(VENV)/.bench: $(VENV)/.installed
 
 # One BLAS thread, as the worker sets it.
 bench: $(VENV)/.bench
-	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.accuracy
+	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks.accuracy
 
 # What `make bench` compares with and has to be trained, once: six hours of one core, less with a GPU (see --help).
 bench-learned: $(VENV)/.bench
-	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 nice -n 19 $(BIN)/python -m tests.benchmarks.learned
+	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 nice -n 19 $(BIN)/python -m benchmarks.learned
 
 # One BLAS thread, as the worker sets it.
 # ONLY: some of its parts, for instance `make bench-truth ONLY=nights`.
 ONLY ?= lenses gate drifts nights twice
 bench-truth: $(VENV)/.bench $(VENV)/.train
-	for part in $(ONLY); do OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.$$part || exit 1; done
+	for part in $(ONLY); do OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks.$$part || exit 1; done
 
 # BEFORE: a clone of an earlier release with its .venv; `git worktree add ../esc-before v0.1.0 && make -C ../esc-before setup`.
 bench-cost: setup
-	$(BIN)/python -m tests.benchmarks.cost $(if $(BEFORE),--before $(BEFORE))
+	$(BIN)/python -m benchmarks.cost $(if $(BEFORE),--before $(BEFORE))
 
 bench-versions: setup
-	$(BIN)/python -m tests.benchmarks.versions
+	$(BIN)/python -m benchmarks.versions
 
 bench-rate: setup
-	$(BIN)/python -m tests.benchmarks.rate
+	$(BIN)/python -m benchmarks.rate
 
 # One BLAS thread, as the worker sets it.
 bench-follow: setup
-	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.shaking
-	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.shaking --lens usual
-	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.shaking --size 4k --seconds 4
-	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.tracking_cost $(if $(BEFORE),--before $(BEFORE))
+	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks.shaking
+	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks.shaking --lens usual
+	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks.shaking --size 4k --seconds 4
+	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks.tracking_cost $(if $(BEFORE),--before $(BEFORE))
 
 bench-video: setup
-	$(BIN)/python -m tests.benchmarks.stitch_video
+	$(BIN)/python -m benchmarks.stitch_video
 
 $(VENV)/.train: $(VENV)/.installed
 	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[train]'

@@ -13,9 +13,9 @@ from pathlib import Path
 import httpx
 import pytest
 
+from testbed.ports import free_port
+from testbed.running import DEADLINE_S, Service, keys_in, png, venue, wait_for
 from tests.e2e.routes.test_following import Stream
-from tests.e2e.running import DEADLINE_S, Service, keys_in, png, venue, wait_for
-from tests.ports import free_port
 from tests.worker.duties.test_webhook_delivery import certificate
 
 SAMPLES = Path(__file__).parents[2] / "docker" / "proxy"

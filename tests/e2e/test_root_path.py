@@ -5,8 +5,8 @@ import shutil
 import pytest
 
 from service.client import Client
+from testbed.running import Service, keys_in, png, venue
 from tests.e2e.routes.test_following import Stream
-from tests.e2e.running import Service, keys_in, png, venue
 from tests.e2e.test_proxies import NAME, Caddy, Nginx
 
 ROOT = "/truck/esc"

@@ -9,7 +9,7 @@ from functools import cache
 import pytest
 
 from service.settings import MODEL_BESIDE_THE_CODE
-from tests.e2e.running import Service, ready, wait_for
+from testbed.running import Service, ready, wait_for
 from tests.once import made_once
 from tests.pages import newcomer
 from tests.pages.browsing import browser_at, chromium, person, tab

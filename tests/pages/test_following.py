@@ -6,7 +6,7 @@ import time
 import pytest
 from playwright.sync_api import expect
 
-from tests.e2e.running import Service, venue
+from testbed.running import Service, venue
 from tests.pages.browsing import in_each_scheme, list_from, wait_until
 
 # While a service is away, a browser says so at each try; and of what it was loading when the service was killed.

@@ -12,9 +12,9 @@ from service.pages.page_rendering import templates
 from service.pages.trend_curves import trend_curves
 from service.schemas.geometry import Moved
 from service.schemas.trend import Chart, Trend, TrendPoint
+from testbed.stock import Stock
 from tests.pages.browsing import differs, in_each_scheme, look
 from tests.trending import nights, noisy
-from tests.worker.stock import Stock
 
 SUMMER = datetime(2026, 6, 1, 2, tzinfo=UTC)
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.real.pair import FOLDER, RealPair
+from testbed.real_pair import FOLDER, RealPair
 
 
 @pytest.fixture(scope="session")

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from testbed.real_pair import FOLDER
 from tests.once import made_once
-from tests.real.pair import FOLDER
 from worker.calibration.geometry.camera import Camera, Pose
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.lens import Intrinsics

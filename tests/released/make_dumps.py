@@ -11,9 +11,9 @@ from base64 import b64encode
 from contextlib import closing
 from pathlib import Path
 
-from tests.e2e.running import Service, upload, venue, wait_for
-from tests.homes import Embedded, Home, Servers, environment, postgres_binaries, postgres_server, s3_server
-from tests.released import DUMPS, Release
+from testbed.homes import Embedded, Home, Servers, environment, postgres_binaries, postgres_server, s3_server
+from testbed.released import DUMPS, Release
+from testbed.running import Service, upload, venue, wait_for
 
 SECRET = "whsec_" + b64encode(bytes(32)).decode()
 ALARMS = {"rejected_in_a_row": 1, "moved_since_first_px": 40, "callback_url": "https://example.com/alarms"}

@@ -9,9 +9,9 @@ from obstore.store import from_url
 
 from service.schemas.names import OPEN_STATUSES
 from service.store.database import SCHEMA_TABLE
-from tests.e2e.running import png, wait_for
-from tests.homes import Servers, in_both_homes
-from tests.released import DUMPS
+from testbed.homes import Servers, in_both_homes
+from testbed.released import DUMPS
+from testbed.running import png, wait_for
 
 VENUES = ["cancelled", "everything", "failed", "partly", "rejected", "waiting"]
 

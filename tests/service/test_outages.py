@@ -10,7 +10,7 @@ import pytest
 
 from service.app import create_app
 from service.settings import Settings
-from tests.e2e.running import png, venue
+from testbed.running import png, venue
 
 FRAMES = [(side, png()) for side in ("left", "right")]
 

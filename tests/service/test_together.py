@@ -23,9 +23,9 @@ from service.store.jobs.queries import JobPage
 from service.store.jobs.submission import KeyReused, QueueFull, Submission
 from service.store.statistics import counters
 from service.store.workers import WorkerRepository
-from tests.e2e.running import venue
-from tests.homes import in_both_homes, on_servers
-from tests.worker.stock import anyway, result
+from testbed.homes import in_both_homes, on_servers
+from testbed.running import venue
+from testbed.stock import anyway, result
 
 LIMIT = 3
 SHIFTED = [0.0, -55.0, 9.0]

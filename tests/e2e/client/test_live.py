@@ -10,14 +10,14 @@ from subprocess import PIPE
 import numpy as np
 import pytest
 
-from tests.e2e import warm
+from testbed import warm
+from testbed.program import TURNED
+from testbed.rtsp import encode, filming, has_server
+from testbed.running import venue, wait_for
+from testbed.synthetic import pair, pair_frames
 from tests.e2e.client.test_stitching import document
 from tests.e2e.commands import esc_here
-from tests.e2e.program import TURNED
-from tests.e2e.running import venue, wait_for
-from tests.rtsp import encode, filming, has_server
 from tests.service.live.receiving import freed_packet, listening, opentrackio_sample, port_of
-from tests.worker.calibration.synthetic import pair, pair_frames
 from tests.worker.video.shaking import film_shaking
 
 FRAMES_PER_SECOND = 5
@@ -79,7 +79,7 @@ def test_poses_go_on_when_the_service_is_gone(start, name):
         assert number in (1, 2)
 
 
-@pytest.mark.parametrize("arguments", [["live", "tests/demo/venue.json", "--json"], ["--version"], ["--help"]])
+@pytest.mark.parametrize("arguments", [["live", "demo/venue.json", "--json"], ["--version"], ["--help"]])
 def test_a_command_whose_output_nobody_reads_any_more_ends_in_silence(arguments):
     reads, writes = os.pipe()
     os.close(reads)

@@ -8,8 +8,8 @@ import av
 import pytest
 
 from service.schemas.venue import VenueIn
-from tests.rtsp import encode, filming, has_server, recording
-from tests.worker.calibration.synthetic import pair, pair_frames
+from testbed.rtsp import encode, filming, has_server, recording
+from testbed.synthetic import pair, pair_frames
 from tests.worker.video.filming import LEFT, PITCH, RIGHT, cameras, film
 from tests.worker.video.shaking import COUNT, film_shaking, shaken
 from worker.video import clips as clips_of

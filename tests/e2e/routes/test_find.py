@@ -7,8 +7,8 @@ import pytest
 import sqlalchemy as sa
 
 from service.store import tables
-from tests.e2e.running import png, upload, venue
-from tests.homes import in_both_homes
+from testbed.homes import in_both_homes
+from testbed.running import png, upload, venue
 
 
 def site(name, behaviour="accept", cameras=("left", "right"), **known):

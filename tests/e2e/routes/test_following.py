@@ -15,9 +15,9 @@ import pytest
 from service import child_process
 from service.store.database import connect
 from service.store.venues import VenueRepository
-from tests.e2e.running import DEADLINE_S, Service, venue, wait_for
+from testbed.homes import in_both_homes
+from testbed.running import DEADLINE_S, Service, venue, wait_for
 from tests.e2e.worker.test_callbacks import LOCAL, SECRET
-from tests.homes import in_both_homes
 from tests.worker.receiver import Receiver
 
 RENDERER = Path(__file__).parents[3] / "docs" / "examples" / "renderer.py"

@@ -10,9 +10,9 @@ import pytest
 import sqlalchemy as sa
 
 from service.store import tables
+from testbed.homes import in_both_homes
+from testbed.running import DEADLINE_S, SIZE, alive, png, upload, venue, wait_for
 from tests.e2e.observe.figures import figures
-from tests.e2e.running import DEADLINE_S, SIZE, alive, png, upload, venue, wait_for
-from tests.homes import in_both_homes
 
 # What a busy machine may add to what is promised.
 BUSY_S = 10

@@ -12,8 +12,8 @@ import sqlalchemy as sa
 
 from service.settings import Settings
 from service.store import tables
+from testbed.running import wait_for
 from tests.e2e.commands import esc_here
-from tests.e2e.running import wait_for
 from tests.worker.receiver import Receiver
 from worker.duties import webhook_request
 

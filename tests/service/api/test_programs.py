@@ -14,7 +14,7 @@ from service.api.programs.running import OneAtATime
 from service.schemas.problems import Problem
 from service.schemas.programs.clicked_pose import ClickedPoseRequest
 from service.settings import Settings
-from tests.e2e.running import venue
+from testbed.running import venue
 
 SLOW = [sys.executable, "-c", "import sys, time; time.sleep(0.5); sys.stdout.write(sys.stdin.read())"]
 HANGING = [sys.executable, "-c", "import time; time.sleep(600)"]

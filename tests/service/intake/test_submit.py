@@ -18,8 +18,8 @@ from service.settings import Settings
 from service.store.jobs.queries import JobPage
 from service.store.jobs.submission import VenueBusy
 from service.store.jobs.task import Origin
-from tests.e2e.running import png, venue
-from tests.homes import files, in_both_homes
+from testbed.homes import files, in_both_homes
+from testbed.running import png, venue
 
 pytestmark = in_both_homes
 

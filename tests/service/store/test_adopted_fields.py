@@ -8,9 +8,9 @@ from service.schemas.results import AdoptableNumber
 from service.store.adopted_fields import NoSuchJob, NotAdoptable, NumberRefused
 from service.store.jobs.decisions import VenueHasChanged
 from service.store.memories import newest_memories
-from tests.homes import in_both_homes
+from testbed.homes import in_both_homes
+from testbed.stock import anyway, result
 from tests.service.store.test_refined import refined
-from tests.worker.stock import anyway, result
 from worker.calibration.geometry.field import Field
 from worker.jobs.from_schemas import pitch_of
 

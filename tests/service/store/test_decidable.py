@@ -3,7 +3,7 @@
 import pytest
 
 from service.store.jobs.decisions import OpenDecisions, VenueHasChanged
-from tests.homes import in_both_homes
+from testbed.homes import in_both_homes
 
 BOTH = frozenset({"left", "right"})
 NOTHING = OpenDecisions(frozenset(), reject=False)

@@ -18,10 +18,10 @@ from service.schemas.venue import Venue, VenueIn
 from service.store import tables
 from service.store.documents import join_additions, result_columns, stored_result, stored_venue, venue_columns
 from service.store.jobs.task import UnreadableJob
-from tests.e2e.program import DISPLACEMENT
-from tests.e2e.running import venue
-from tests.homes import in_both_homes
-from tests.worker.stock import result
+from testbed.homes import in_both_homes
+from testbed.program import DISPLACEMENT
+from testbed.running import venue
+from testbed.stock import result
 
 OF_0_1_0 = json.loads((Path(__file__).parents[2] / "openapi" / "0.1.0.json").read_text())
 RIDGE = AdoptableNumber(name="ridge_height_m", given=0.0, value=0.332, sigma=0.051, moves_m={"left": 0.08})

@@ -7,8 +7,8 @@ import sqlalchemy as sa
 from service.pages.venues import venue_rows
 from service.schemas.health import Alarms
 from service.store.statistics.venue_summary import IN_CURVE
-from tests.homes import in_both_homes
-from tests.worker.stock import anyway
+from testbed.homes import in_both_homes
+from testbed.stock import anyway
 
 
 def glance(stock, venue="v"):

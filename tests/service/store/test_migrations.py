@@ -21,7 +21,7 @@ from service.store.jobs.submission import Submission
 from service.store.repositories import Repositories
 from service.store.statistics.job_outcome import ENDED
 from service.store.statistics.snapshot import VenueGauges, read_statistics
-from tests.homes import in_both_homes
+from testbed.homes import in_both_homes
 
 pytestmark = pytest.mark.slow
 

@@ -6,9 +6,9 @@ from service.schemas.geometry import Light
 from service.schemas.results import View
 from service.store.jobs.decisions import VenueHasChanged
 from service.store.statistics.snapshot import read_statistics
-from tests.homes import in_both_homes
+from testbed.homes import in_both_homes
+from testbed.stock import anyway, result
 from tests.service.store.test_alarms import failed, rings, told, watched
-from tests.worker.stock import anyway, result
 
 
 def standing(stock):

@@ -9,8 +9,8 @@ from service.schemas.results import Refined
 from service.store import tables
 from service.store.memories import newest_memories
 from service.store.refined import NoRefinedPose
-from tests.homes import in_both_homes
-from tests.worker.stock import anyway, result
+from testbed.homes import in_both_homes
+from testbed.stock import anyway, result
 
 LENS = Intrinsics(matrix=[[60.06, 0, 32], [0, 60.06, 24], [0, 0, 1]], distortion=[0, 0, 0, 0], sigma={"fx": 0.01})
 

@@ -6,8 +6,8 @@ from service.schemas.field import FieldOfPlay
 from service.schemas.geometry import Intrinsics
 from service.store.jobs.decisions import NoPoses, VenueHasChanged
 from service.store.revisions import NoSuchRevision, RevisionUnfit
-from tests.homes import in_both_homes
-from tests.worker.stock import anyway, result
+from testbed.homes import in_both_homes
+from testbed.stock import anyway, result
 
 
 def told(stock):

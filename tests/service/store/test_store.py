@@ -18,8 +18,8 @@ from service.store.blobs import Blobs
 from service.store.ids import new_id
 from service.store.venues import VenueRepository
 from service.store.workers import WorkerRepository
-from tests.homes import in_both_homes, on_servers
-from tests.worker.stock import anyway, result
+from testbed.homes import in_both_homes, on_servers
+from testbed.stock import anyway, result
 
 
 @in_both_homes

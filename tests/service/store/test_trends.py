@@ -10,9 +10,9 @@ import sqlalchemy as sa
 
 from service.schemas.health import Alarms
 from service.store import tables, trends
-from tests.homes import in_both_homes
+from testbed.homes import in_both_homes
+from testbed.stock import anyway
 from tests.trending import SIGMA_M, displacement, night, nights, noisy
-from tests.worker.stock import anyway
 
 pytestmark = pytest.mark.slow
 

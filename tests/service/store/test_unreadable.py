@@ -7,10 +7,10 @@ import sqlalchemy as sa
 
 from service.store import tables, unreadable
 from service.store.unreadable import UnreadableRow
-from tests.e2e.running import venue
-from tests.homes import in_both_homes
+from testbed.homes import in_both_homes
+from testbed.running import venue
+from testbed.stock import anyway, result
 from tests.service.serving_in_process import InProcess
-from tests.worker.stock import anyway, result
 from worker.duties.alarms import AlarmTimer
 
 SUNKEN = [[-18.5, 0.0, -0.001], [18.5, 0.0, -0.001]]

@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from tests.worker.calibration.synthetic import CROWNED, moved, pair, pair_frames
+from testbed.synthetic import CROWNED, moved, pair, pair_frames
 from worker.calibration.calibrate import calibrate
 from worker.calibration.gate.quality import Gate, ridge_rejection
 from worker.calibration.geometry.parameters import free_focal_lengths

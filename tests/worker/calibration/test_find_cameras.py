@@ -6,9 +6,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-from tests.worker.calibration import synthetic
+from testbed import synthetic
+from testbed.synthetic import CROWNED, PITCH, moved, paint_frame, pair, pair_frames, worn
 from tests.worker.calibration.gate.test_quality import good
-from tests.worker.calibration.synthetic import CROWNED, PITCH, moved, paint_frame, pair, pair_frames, worn
 from tests.worker.calibration.test_calibrate import white_on_green
 from worker.calibration.find_cameras import FoundCamera, find_cameras, why_lens_unfit, why_not_confirmed
 from worker.calibration.gate.quality import Gate

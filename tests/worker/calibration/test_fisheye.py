@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.worker.calibration.synthetic import CROWNED, PITCH, moved, paint_frame
+from testbed.synthetic import CROWNED, PITCH, moved, paint_frame
 from tests.worker.calibration.test_calibrate import white_on_green
 from worker.calibration.calibrate import calibrate
 from worker.calibration.detection.segmentation import reachable_regions

@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from tests.worker.calibration.synthetic import CROWNED, GRASS, moved, paint_frame, pair, pair_frames
+from testbed.synthetic import CROWNED, GRASS, moved, paint_frame, pair, pair_frames
 from tests.worker.calibration.test_calibrate import white_on_green
 from worker.calibration import solve as settling
 from worker.calibration.calibrate import calibrate

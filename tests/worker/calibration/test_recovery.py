@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
-from tests.worker.calibration.synthetic import CROWNED, camera, moved, paint_frame, pair
+from testbed.synthetic import CROWNED, camera, moved, paint_frame, pair
 from tests.worker.calibration.test_calibrate import SHIFT, TURN, frames, outdated, white_on_green
 from tests.worker.calibration.test_near_path import WIND
 from tests.worker.calibration.test_sports import field

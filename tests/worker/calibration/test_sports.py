@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fields.template import Template, load
-from tests.worker.calibration.synthetic import camera, moved, paint_frame
+from testbed.synthetic import camera, moved, paint_frame
 from tests.worker.calibration.test_calibrate import SHIFT, TURN, white_on_green
 from worker.calibration.calibrate import calibrate
 from worker.calibration.geometry.field import Field

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.worker.calibration.synthetic import CROWNED, camera, moved, paint_markings, pair
+from testbed.synthetic import CROWNED, camera, moved, paint_markings, pair
 from tests.worker.calibration.test_calibrate import frames, outdated, result, run
 from tests.worker.calibration.test_near_path import WIND
 from worker.calibration.geometry.camera import Pose

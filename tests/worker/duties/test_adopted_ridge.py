@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from service.schemas.health import Alarms as Rules
-from tests.worker.duties.year import VENUE, Year, cameras, fast_motion, frames_of
-from tests.worker.stock import anyway
+from testbed.stock import anyway
+from testbed.year import VENUE, Year, cameras, fast_motion, frames_of
 
 pytestmark = pytest.mark.slow
 

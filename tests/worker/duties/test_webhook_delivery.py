@@ -17,10 +17,10 @@ from service.settings import Settings
 from service.store import tables
 from service.store.events.outbox import AT_ONCE_PER_RECEIVER
 from service.store.jobs.queries import JobPage
-from tests.homes import in_both_homes
+from testbed.homes import in_both_homes
+from testbed.stock import Stock, anyway
 from tests.worker.certificates import certificate
 from tests.worker.receiver import TELLTALE, Dripping, Endless, Receiver, Silent, Talkative, Telltale
-from tests.worker.stock import Stock, anyway
 from worker.duties import outbound_guard, webhook_request
 from worker.duties.webhook_delivery import AT_ONCE, ATTEMPT, WebhookDelivery
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from fields.template import load
-from tests.worker.calibration.synthetic import PITCH, camera, paint_markings
+from testbed.synthetic import PITCH, camera, paint_markings
 from worker.calibration.detection.contrast import Channels
 from worker.calibration.detection.evidence import evidence_of
 from worker.calibration.detection.exclusions import left_out

@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from tests.worker.calibration.synthetic import PITCH, camera, moved, paint_markings
+from testbed.synthetic import PITCH, camera, moved, paint_markings
 from worker.calibration.detection.contrast import Channels
 from worker.calibration.diagnostics.markings import MarkingReport, direction_of, in_words, report_markings
 from worker.calibration.geometry.field import FOOTBALL, Field

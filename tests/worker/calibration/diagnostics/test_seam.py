@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from tests.worker.calibration.synthetic import CROWNED, moved, pair, pair_frames, pair_markings
+from testbed.synthetic import CROWNED, moved, pair, pair_frames, pair_markings
 from worker.calibration.detection.contrast import Channels
 from worker.calibration.diagnostics.seam import measure_seam
 from worker.calibration.refinement.refine import Observations, evaluate_poses

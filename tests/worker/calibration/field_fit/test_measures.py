@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fields.template import Template, load
-from tests.worker.calibration.synthetic import (
+from testbed.synthetic import (
     BARREL,
     CROWNED,
     PITCH,

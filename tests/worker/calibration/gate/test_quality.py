@@ -5,7 +5,7 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from tests.worker.calibration.synthetic import PITCH, moved, pair
+from testbed.synthetic import PITCH, moved, pair
 from worker.calibration.detection.evidence import Evidence
 from worker.calibration.detection.view_condition import ViewCondition, ViewFigures
 from worker.calibration.diagnostics.overlap import Overlap

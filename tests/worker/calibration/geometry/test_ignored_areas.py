@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tests.worker.calibration.synthetic import CROWNED, pair, pair_frames, pair_markings
+from testbed.synthetic import CROWNED, pair, pair_frames, pair_markings
 from worker.calibration.detection.contrast import Channels
 from worker.calibration.detection.evidence import evidence_of
 from worker.calibration.detection.exclusions import left_out, of_use

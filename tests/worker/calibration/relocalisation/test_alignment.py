@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.worker.calibration.synthetic import PITCH, camera, paint_frame
+from testbed.synthetic import PITCH, camera, paint_frame
 from tests.worker.calibration.test_calibrate import white_on_green
 from worker.calibration.detection.segmentation import Region
 from worker.calibration.geometry.rotation import rotation_matrices

@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from tests.worker.calibration.synthetic import BARREL, PITCH, camera, paint_frame
+from testbed.synthetic import BARREL, PITCH, camera, paint_frame
 from tests.worker.calibration.test_calibrate import white_on_green
 from tests.worker.calibration.test_sports import field
 from worker.calibration.detection.contrast import Channels

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.worker.calibration.synthetic import camera
+from testbed.synthetic import camera
 from tests.worker.calibration.test_sports import field
 from worker.calibration.relocalisation.field_map import FieldMap
 from worker.calibration.relocalisation.hypotheses import Hypotheses

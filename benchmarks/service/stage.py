@@ -1,0 +1,53 @@
+"""Where the benchmarks play: both homes, and services in them that end with their block."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+
+from testbed.homes import HASTY, Embedded, Home, Servers, environment, postgres_binaries, postgres_server, s3_server
+from testbed.running import Service
+
+# What PostgreSQL has committed outlives its processes; nothing here has to outlive the machine.
+SURE = ("fsync=off", "full_page_writes=off")
+EMBEDDED, SERVERS = "SQLite, folder", "PostgreSQL, S3"
+
+
+@contextmanager
+def homes(postgres_options: Sequence[str] = HASTY) -> Iterator[dict[str, Home]]:
+    """Both."""
+    binaries = postgres_binaries()
+    if binaries is None:
+        raise SystemExit("PostgreSQL is needed (Debian: apt-get install postgresql)")
+    with postgres_server(binaries, postgres_options) as postgres, s3_server() as bucket:
+        yield {EMBEDDED: Embedded(), SERVERS: Servers(postgres, bucket)}
+
+
+@contextmanager
+def service(home: Home, *arguments: str, **settings: str) -> Iterator[Service]:
+    """`esc up` or what the arguments say, on a folder of its own, with the settings' defaults for silence."""
+    with tempfile.TemporaryDirectory(prefix="esc-bench-") as name:
+        folder = Path(name) / "esc"
+        given = environment(home.settings(folder)) | {"ESC_TAKEOVER_AFTER_S": "10", "ESC_TIDY_EVERY_S": "1"} | settings
+        running = Service(folder, *arguments, **given)
+        try:
+            yield running
+        finally:
+            running.kill()
+
+
+def resident_mb(process: int) -> float:
+    """The memory of a process."""
+    status = Path(f"/proc/{process}/status").read_text()
+    return int(status.partition("VmRSS:")[2].split()[0]) / 1000
+
+
+def spread(seconds: Sequence[float], digits: int = 1) -> str:
+    """Median, and the least and the most."""
+    if not len(seconds):
+        return "none"
+    return f"{np.median(seconds):.{digits}f} ({min(seconds):.{digits}f} to {max(seconds):.{digits}f})"
