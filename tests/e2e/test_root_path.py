@@ -6,8 +6,8 @@ import pytest
 
 from service.client import Client
 from testbed.running import Service, keys_in, png, venue
-from tests.e2e.routes.test_following import Stream
-from tests.e2e.test_proxies import NAME, Caddy, Nginx
+from tests.e2e.proxies import NAME, Caddy, Nginx
+from tests.e2e.routes.event_stream import Stream
 
 ROOT = "/truck/esc"
 

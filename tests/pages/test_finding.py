@@ -8,7 +8,7 @@ from playwright.sync_api import expect
 from service.schemas.names import id_like
 from service.store.jobs.queries import ONE
 from testbed.running import png, upload
-from tests.e2e.routes.test_find import depth, find, forget_frames, found, site
+from tests.e2e.routes.searching import depth, find, forget_frames, found, site
 from tests.pages import browsing
 
 

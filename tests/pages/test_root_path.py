@@ -7,7 +7,7 @@ from urllib.parse import urlsplit
 import pytest
 
 from testbed.running import Service, png, venue
-from tests.e2e.test_proxies import Nginx
+from tests.e2e.proxies import Nginx
 from tests.pages.browsing import PATIENCE_MS, keep_one_path, tab
 
 ROOT = "/esc"

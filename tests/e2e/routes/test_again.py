@@ -1,7 +1,7 @@
 """A job's frames once more."""
 
 from testbed.running import venue
-from tests.e2e.routes.test_find import forget_frames
+from tests.e2e.routes.searching import forget_frames
 
 
 def test_the_same_frames_and_options_are_another_job_from_the_poses_that_hold_now(service, name):

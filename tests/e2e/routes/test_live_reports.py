@@ -8,7 +8,7 @@ import pytest
 
 from testbed.homes import in_both_homes
 from testbed.running import DEADLINE_S, venue
-from tests.e2e.routes.test_following import Stream
+from tests.e2e.routes.event_stream import Stream
 
 LEFT = {
     "id": "left",

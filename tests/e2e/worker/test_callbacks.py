@@ -4,7 +4,6 @@ import json
 import os
 import signal
 import threading
-from base64 import b64encode
 from datetime import UTC, datetime
 
 import pytest
@@ -14,11 +13,8 @@ from service.settings import Settings
 from service.store import tables
 from testbed.running import wait_for
 from tests.e2e.commands import esc_here
-from tests.worker.receiver import Receiver
+from tests.worker.receiver import LOCAL, SECRET, Receiver
 from worker.duties import webhook_request
-
-SECRET = "whsec_" + b64encode(bytes(32)).decode()
-LOCAL = {"ESC_WEBHOOK_SECRET": SECRET, "ESC_CALLBACK_ALLOW_HTTP": "true", "ESC_CALLBACK_ALLOW_PRIVATE": "true"}
 
 
 class Holding(Receiver):

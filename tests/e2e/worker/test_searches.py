@@ -1,6 +1,6 @@
 """Searches for cameras, which take minutes, run beside calibrations and hold none of them up."""
 
-from tests.e2e.routes.test_find import find, found, site
+from tests.e2e.routes.searching import find, found, site
 
 
 def test_a_calibration_that_is_submitted_during_a_search_ends_before_it(service, name):

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from testbed.synthetic import CROWNED, PITCH, moved, paint_frame
-from tests.worker.calibration.test_calibrate import white_on_green
+from tests.worker.calibration.outdated_pair import white_on_green
 from worker.calibration.calibrate import calibrate
 from worker.calibration.detection.segmentation import reachable_regions
 from worker.calibration.geometry.camera import Camera, Pose, inside, project, project_planes

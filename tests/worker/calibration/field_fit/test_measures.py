@@ -17,7 +17,7 @@ from testbed.synthetic import (
     pair,
     pair_frames,
 )
-from tests.worker.calibration.test_calibrate import white_on_green
+from tests.worker.calibration.outdated_pair import white_on_green
 from worker.calibration.detection.contrast import Channels
 from worker.calibration.field_fit.measures import fit_field, fit_measures
 from worker.calibration.geometry.field import Field

@@ -7,7 +7,7 @@ import pytest
 
 from testbed.synthetic import BARREL, PITCH, camera
 from tests.scenes import unposed
-from tests.worker.calibration.gate.test_quality import good
+from tests.worker.calibration.gate.good_result import good
 from worker.calibration.gate.displacement import farthest_place, measure_displacement, sight_axes
 from worker.calibration.geometry import derivatives
 from worker.calibration.refinement.uncertainty import Deviation, Sigma

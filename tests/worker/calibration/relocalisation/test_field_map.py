@@ -5,7 +5,7 @@ import pytest
 
 from fields.template import Template
 from testbed.synthetic import PITCH
-from tests.worker.calibration.test_sports import field
+from tests.worker.calibration.sports import field
 from worker.calibration.geometry.field import Field
 from worker.calibration.relocalisation.field_map import FieldMap
 
