@@ -105,7 +105,7 @@ bench-learned: $(VENV)/.bench
 
 # One BLAS thread, as the worker sets it.
 # ONLY: some of its parts, for instance `make bench-truth ONLY=nights`.
-ONLY ?= lenses gate drifts nights twice
+ONLY ?= lenses gate nights twice
 bench-truth: $(VENV)/.bench $(VENV)/.train
 	for part in $(ONLY); do OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks.$$part || exit 1; done
 

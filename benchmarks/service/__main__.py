@@ -1,4 +1,4 @@
-"""`make bench-service`: what crashes, outages, load and months of work do to the service.
+"""`make bench-service`: what crashes, load and months of work do to the service.
 
 Prints a table per section. Real processes, real sockets, real SQLite, PostgreSQL and S3 (moto's server); where geometry
 is not what is asked for, the program that computes a job is the stub of the tests.
@@ -10,12 +10,11 @@ import argparse
 import os
 from collections.abc import Callable
 
-from benchmarks.service import crashes, endurance, fleet, kills, lists, load, outages
+from benchmarks.service import endurance, fleet, kills, lists, load
 
 SECTIONS: dict[str, Callable[[argparse.Namespace], list[str]]] = {
-    "crashes": crashes.table,
     "kills": kills.table,
-    "outages": outages.table,
+    "takeovers": kills.takeovers,
     "pollers": load.table,
     "longrun": endurance.table,
     "lists": lists.table,
@@ -27,10 +26,9 @@ def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--only", nargs="+", choices=SECTIONS, default=list(SECTIONS))
-    parser.add_argument("--moments", type=int, default=20, help="at which something is killed, per home")
+    parser.add_argument("--moments", type=int, default=20, help="at which one of two workers is killed")
     parser.add_argument("--seeds", type=int, default=40, help="by which a victim and a moment are drawn, one a round")
     parser.add_argument("--seed", type=int, help="the first of them; otherwise drawn, and printed")
-    parser.add_argument("--away-s", type=float, default=10.0, help="how long the database is away")
     parser.add_argument("--rounds", type=int, default=7, help="jobs alone and jobs with pollers, alternately")
     parser.add_argument("--jobs", type=int, default=500, help="in a row, through the stub of the engine")
     parser.add_argument("--real-jobs", type=int, default=100, help="in a row, through the engine, at reduced size")

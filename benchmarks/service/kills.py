@@ -2,7 +2,8 @@
 
 Afterwards every job whose submission was answered has ended as it was asked, each once, and the books add up
 (`testbed.books`): no accepted job lost, none applied twice. A difference ends the benchmark, and its seed is the last
-that was printed: `--only kills --seeds 1 --seed N` plays it again.
+that was printed: `--only kills --seeds 1 --seed N` plays it again. `--only takeovers`: one of two workers is killed at
+moments of its jobs, and the other one takes over.
 """
 
 from __future__ import annotations
@@ -16,19 +17,30 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import dataclass, field
+from subprocess import Popen
 
 import httpx
+import sqlalchemy as sa
 
 from benchmarks.service.stage import EMBEDDED, SERVERS, SURE, homes, service, spread
 from service.serving import YOUNG_S
+from service.store import tables
 from testbed.books import settle
 from testbed.homes import Home, Servers
-from testbed.killing import A_LITTLE_LONGER, submitted
+from testbed.killing import (
+    A_LITTLE_LONGER,
+    chance,
+    kill_worker_of_several,
+    moment,
+    seconds_of_a_job,
+    submitted,
+)
 from testbed.running import Service, wait_for
 
 VICTIMS = ("worker", "API", "database")
-COMPUTES = "accept 0.5"
+COMPUTES, TAKEN_OVER = "accept 0.5", "accept 1"
 MOST_JOBS = 3
 # About what each takes, on a machine that does other things too: a seed stands for the same moment on all machines.
 SUBMISSION_S, JOB_S = 0.1, 1.5
@@ -133,6 +145,54 @@ def _insisted(running: Service, venue: str) -> str:
     return wait_for(again)
 
 
+def takeovers(options: argparse.Namespace) -> list[str]:
+    """Kill one of two workers at random moments of a job, and measure until the other one takes it over."""
+    ends, seconds, takeovers = [], [], []
+    drawn = chance()
+    with homes() as both, service(both[SERVERS], "serve") as running, ExitStack() as stack:
+
+        def work(name: str) -> Popen:
+            process = running.worker_beside(running.data.parent / name, name)
+            stack.callback(process.wait)
+            stack.callback(process.kill)
+            return process
+
+        workers = {name: work(name) for name in ("one", "two")}
+        running.ready()
+        whole = seconds_of_a_job(running, running.venue("alone", TAKEN_OVER))
+        for number in range(options.moments):
+            wait_for(lambda: _registered_workers(running) == set(workers))
+            venue = running.venue(f"v{number}", TAKEN_OVER)
+            death = kill_worker_of_several(running, workers, venue, moment(drawn, whole))
+            ends.append(death.job)
+            seconds.append(death.to_end_s)
+            if death.to_takeover_s is not None:
+                takeovers.append(death.to_takeover_s)
+            wait_for(lambda name=death.worker: name not in _registered_workers(running))
+            workers[death.worker] = work(death.worker)
+        settle(running)
+    succeeded = sum(job["status"] == "succeeded" for job in ends)
+    return [
+        f"{options.moments} random moments, from the submission to a tenth beyond the end.",
+        "",
+        "| jobs | ended as succeeded | attempts | s from the kill to the end | s to a takeover |",
+        "|---|---|---|---|---|",
+        f"| {len(ends)} | {succeeded} | {_counts([job['attempt'] for job in ends])} | {spread(seconds)} "
+        f"| {spread(takeovers)}, {len(takeovers)} times |",
+    ]
+
+
+def _registered_workers(running: Service) -> set[str]:
+    """Names of the workers with a row, which goes when others have taken a worker for dead."""
+    with running.database() as connection:
+        return set(connection.scalars(sa.select(tables.workers.c.name)))
+
+
+def _counts(attempts: list[int]) -> str:
+    return ", ".join(f"{attempts.count(number)} x {number}" for number in sorted(set(attempts)))
+
+
 def _told(tally: Tally) -> str:
-    counts = ", ".join(f"{tally.attempts.count(number)} x {number}" for number in sorted(set(tally.attempts)))
-    return f"{len(tally.seconds)} | {tally.jobs} | {tally.promised} | {counts} | {spread(tally.seconds)}"
+    return (
+        f"{len(tally.seconds)} | {tally.jobs} | {tally.promised} | {_counts(tally.attempts)} | {spread(tally.seconds)}"
+    )
