@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from functools import cache, lru_cache
 
 import cv2
@@ -19,8 +19,9 @@ import numpy as np
 
 from benchmarks import plots
 from benchmarks.methods import CLICKED, METHODS, SLOW, THREADS, Seen, cannot_run, engine
+from benchmarks.printing import print_sections, table_head
 from benchmarks.rows import Rows
-from benchmarks.scenes import FOLDER, HOURS, SIZE, VENUES, Scene, scene, started
+from benchmarks.scenes import FOLDER, VENUES, scene, started
 from benchmarks.truth import Errors, apart, errors
 from worker.calibration.calibrate import calibrate
 from worker.calibration.geometry.camera import Camera
@@ -31,7 +32,6 @@ PULLED_IN_DEG = 0.5
 """What the presets of the paper, which end without a finish, are asked for from 2.1 degrees."""
 SEEDS, STARTS, SLOW_STARTS = 3, 100, 12
 SLOW_VENUES = ("pair-match-1", "apart-match", "pair-real-1", "apart-real")
-HOURLY_VENUES = ("one-match", "pair-match-1", "one-real", "pair-real-1")
 QUICK_VENUES = ("pair-match-1", "pair-real-1", "one-real")
 QUICK_SECTIONS = ("table", "capture", "convergence")
 PAPER = {
@@ -71,8 +71,7 @@ def main() -> None:
     if options.slow_seeds is None:
         options.slow_seeds = 0 if options.quick else 1
     cv2.setNumThreads(THREADS)
-    for name in options.only:
-        print(f"\n## {name}\n", *SECTIONS[name](options), sep="\n", flush=True)
+    print_sections(options.only, SECTIONS, options)
 
 
 def table(options: argparse.Namespace) -> Iterator[str]:
@@ -88,8 +87,7 @@ def table(options: argparse.Namespace) -> Iterator[str]:
     for title, matches in (("Lens and roof match the model", True), ("They do not, as in reality", False)):
         yield f"{title}; mean ± sd over venues and seeds"
         yield ""
-        yield "| | Stitch, px | TrE, cm | RoE, ° | IoU, % | s | core-s | paper: Stitch | TrE | RoE | IoU |"
-        yield "|---|---|---|---|---|---|---|---|---|---|---|"
+        yield table_head(" | Stitch, px | TrE, cm | RoE, ° | IoU, % | s | core-s | paper: Stitch | TrE | RoE | IoU")
         for method in METHODS:
             chosen = [row for row in rows if row["method"] == method and VENUES[row["venue"]][3] == matches]
             if chosen:
@@ -123,15 +121,15 @@ def _cells(rows: Sequence[dict]) -> str:
     )
 
 
-def _rows(venue: str, method: str, seeds: int, light: str | None = None) -> Iterator[dict]:
+def _rows(venue: str, method: str, seeds: int) -> Iterator[dict]:
     """One row per seed: errors and seconds of a method from a start of the paper's size."""
     for seed in range(seeds):
-        key = {"venue": venue, "light": light or VENUES[venue][2], "method": method, "seed": seed}
-        yield _remembered(key, lambda seed=seed: _judge(venue, light, METHODS[method], seed))
+        key = {"venue": venue, "light": VENUES[venue][2], "method": method, "seed": seed}
+        yield _remembered(key, lambda seed=seed: _judge(venue, METHODS[method], seed))
 
 
-def _judge(venue: str, light: str | None, method: Callable, seed: int) -> dict:
-    seen = _seen(venue, light)
+def _judge(venue: str, method: Callable, seed: int) -> dict:
+    seen = _seen(venue)
     answer = method(seen, started(seen.scene.cameras, np.random.default_rng([seed, 1])), seed)
     found = errors(seen.scene, answer.cameras) if answer.has_poses else Errors(answer.stitch_px)
     return {**asdict(found), "seconds": answer.seconds, "core_seconds": answer.core_seconds}
@@ -139,8 +137,7 @@ def _judge(venue: str, light: str | None, method: Callable, seed: int) -> dict:
 
 def capture(options: argparse.Namespace) -> Iterator[str]:
     """How many starts end where the same frames end when started from the truth."""
-    yield "| start | caught | missed and accepted | missed and rejected |"
-    yield "|---|---|---|---|"
+    yield table_head("start | caught | missed and accepted | missed and rejected")
     for size in (1.0, 2.0):
         rows = [
             _remembered(
@@ -200,121 +197,22 @@ def _left(venue: str, number: int, method: str) -> dict:
     return {"shift_m": max(shift for shift, _ in off), "turn_deg": max(turn for _, turn in off)}
 
 
-def honesty(options: argparse.Namespace) -> Iterator[str]:
-    """Errors divided by the sigma that was answered with them: their spread should be near 1."""
-    ratios: dict[tuple[bool, str], list[float]] = {}
-    moments = {(venue, VENUES[venue][2]) for venue in options.venues}
-    moments |= {(venue, light) for venue in _by_the_hour(options) for light in HOURS}
-    for venue, light in sorted(moments):
-        key = {"venue": venue, "light": light, "sigma": True}
-        row = _remembered(key, lambda v=venue, h=light: {"ratios": _ratios(v, h)})
-        for name, values in row["ratios"].items():
-            ratios.setdefault((VENUES[venue][3], name), []).extend(values)
-    yield "| | error / sigma, rms | cameras |"
-    yield "|---|---|---|"
-    for (matches, name), values in ratios.items():
-        kind = "match" if matches else "do not match"
-        yield f"| {name}, venues that {kind} | {np.sqrt(np.mean(np.square(values))):.2f} | {len(values)} |"
-
-
-def _ratios(venue: str, light: str) -> dict[str, list[float]]:
-    """Per camera: the position's and the rotation's error over its sigma."""
-    found: dict[str, list[float]] = {"position": [], "rotation": []}
-    seen = _seen(venue, light)
-    said = engine()(seen, seen.scene.cameras, 0).said
-    assert said is not None
-    for result, true in zip(said.cameras, seen.scene.cameras, strict=True):
-        shift, turn = apart(true.with_pose(result.camera.pose), true)
-        if result.sigma:
-            found["position"].append(shift / result.sigma.position_m)
-            found["rotation"].append(turn / result.sigma.rotation_deg)
-    return found
-
-
-def _by_the_hour(options: argparse.Namespace) -> list[str]:
-    """The venues that are rendered under every light: each light takes minutes."""
-    return [venue for venue in HOURLY_VENUES if venue in options.venues]
-
-
-def hours(options: argparse.Namespace) -> Iterator[str]:
-    """Four times of day."""
-    yield "| | Stitch, px | TrE, cm | RoE, ° | IoU, % | s | core-s |"
-    yield "|---|---|---|---|---|---|---|"
-    for light in HOURS:
-        rows = [row for venue in _by_the_hour(options) for row in _rows(venue, "ESC `esc`", 1, light)]
-        yield f"| {light} | {_cells(rows)} |"
-
-
 def tradeoff(options: argparse.Namespace) -> Iterator[str]:
     """Stitch against metric accuracy over `stitch_weight`, on venues with several cameras that do not match."""
     venues = [name for name in options.venues if not VENUES[name][3] and VENUES[name][0] != "one"]
-    yield "| stitch_weight | Stitch, px | TrE, cm | RoE, ° | IoU, % | s | core-s |"
-    yield "|---|---|---|---|---|---|---|"
+    yield table_head("stitch_weight | Stitch, px | TrE, cm | RoE, ° | IoU, % | s | core-s")
     rows = {}
     for weight in WEIGHTS:
         rows[weight] = [
             _remembered(
                 {"venue": venue, "weight": weight},
-                lambda v=venue, w=weight: _judge(v, None, engine(stitch_weight=w), 0),
+                lambda v=venue, w=weight: _judge(v, engine(stitch_weight=w), 0),
             )
             for venue in venues
         ]
         yield f"| {weight} | {_cells(rows[weight])} |"
     yield ""
     yield f"![the trade-off]({plots.tradeoff(rows)})"
-
-
-def times(_options: argparse.Namespace) -> Iterator[str]:
-    """Seconds of evolution and finish against cameras, pixels and generations."""
-    yield "| cameras | evolution, s | finish, s |"
-    yield "|---|---|---|"
-    four = _seen("four-real").scene
-    for count in range(1, 9):
-        yield f"| {count} | {_timed(_with_cameras(four, count))} |"
-    yield ""
-    yield "| pixels | evolution, s | finish, s |"
-    yield "|---|---|---|"
-    pair = _seen("pair-real-1").scene
-    for factor in (0.25, 0.5, 0.75, 1.0):
-        yield f"| {round(factor * SIZE[0])} x {round(factor * SIZE[1])} | {_timed(_resized(pair, factor))} |"
-    yield ""
-    yield "| generations | evolution, s | finish, s |"
-    yield "|---|---|---|"
-    for generations in (25, 50, 100, 200):
-        yield f"| {generations} | {_timed(pair, generations=generations)} |"
-
-
-def _timed(chosen: Scene, **options: int) -> str:
-    seen = Seen(chosen)
-    runs = []
-    for seed in range(3):
-        said = engine(**options)(seen, started(chosen.cameras, np.random.default_rng([seed, 1])), seed).said
-        assert said is not None
-        runs.append((said.timings.seconds["evolution"], said.timings.seconds["refinement"]))
-    evolution, refinement = np.median(runs, axis=0)
-    return f"{evolution:.2f} | {refinement:.2f}"
-
-
-def _with_cameras(chosen: Scene, count: int) -> Scene:
-    """The first `count` cameras; from the fifth on, the same ones again under other names."""
-    number = len(chosen.cameras)
-    several = [(chosen.cameras[i % number], f"{chosen.cameras[i % number].id}-{i // number}") for i in range(count)]
-    cameras = [replace(camera, id=name) for camera, name in several]
-    return replace(
-        chosen,
-        cameras=cameras,
-        real=cameras,
-        frames={name: [chosen.frames[camera.id][0].copy()] for camera, name in several},
-    )
-
-
-def _resized(chosen: Scene, factor: float) -> Scene:
-    cameras = [replace(camera, intrinsics=camera.intrinsics.scaled(factor)) for camera in chosen.cameras]
-    frames = {
-        camera.id: [cv2.resize(chosen.frames[camera.id][0], camera.intrinsics.size, interpolation=cv2.INTER_AREA)]
-        for camera in cameras
-    }
-    return replace(chosen, cameras=cameras, real=cameras, frames=frames)
 
 
 def convergence(_options: argparse.Namespace) -> Iterator[str]:
@@ -338,28 +236,22 @@ SECTIONS: dict[str, Callable[[argparse.Namespace], Iterator[str]]] = {
     "table": table,
     "capture": capture,
     "presets": presets,
-    "honesty": honesty,
     "tradeoff": tradeoff,
-    "hours": hours,
-    "times": times,
     "convergence": convergence,
 }
 
-_references: dict[str, list[Camera]] = {}
-
 
 @lru_cache(maxsize=12)
-def _seen(venue: str, light: str | None = None) -> Seen:
+def _seen(venue: str) -> Seen:
     """A scene and what the network says of it; the last few are kept."""
-    return Seen(scene(venue, light))
+    return Seen(scene(venue))
 
 
+@cache
 def _reference(venue: str) -> list[Camera]:
-    """Where the frames of a venue end when they start from the truth."""
-    if venue not in _references:
-        seen = _seen(venue)
-        _references[venue] = engine()(seen, seen.scene.cameras, 10_000).cameras
-    return _references[venue]
+    """Return where the frames of a venue end when they start from the truth."""
+    seen = _seen(venue)
+    return engine()(seen, seen.scene.cameras, 10_000).cameras
 
 
 def _remembered(key: dict, run: Callable[[], dict]) -> dict:

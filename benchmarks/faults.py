@@ -25,6 +25,8 @@ from pathlib import Path
 import httpx
 import sqlalchemy as sa
 
+from benchmarks.printing import table_head
+from benchmarks.processes import peak_mb
 from benchmarks.service.stage import EMBEDDED, SERVERS, homes, service
 from service.store import tables
 from testbed.clocks import Clock
@@ -97,8 +99,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seconds", type=float, default=20.0, help="that each fault lasts")
     seconds = parser.parse_args().seconds
-    print("| fault | home | caller | answers | longest wait, s |")
-    print("|---|---|---|---|---|")
+    print(table_head("fault | home | caller | answers | longest wait, s"), flush=True)
     with homes() as both:
         servers = both[SERVERS]
         faults: list[tuple[str, str, Home, Fault]] = [
@@ -237,7 +238,7 @@ def many_uploads(running: Service, peaks: list[float]) -> Iterator[None]:
     """Uploads of many small frames, all at once; notes the API's memory before and its peak."""
     for number in range(UPLOADS):
         running.venue(f"many-{number}")
-    peaks.append(peak_mb(running))
+    peaks.append(peak_mb(running.process.pid))
 
     def send(number: int) -> str:
         files = [(camera, ("f.png", FRAME)) for camera in ("left", "right") for _ in range(FRAMES // 2)]
@@ -250,13 +251,7 @@ def many_uploads(running: Service, peaks: list[float]) -> Iterator[None]:
         yield
         if refused := {*answers} - {""}:
             raise SystemExit(f"uploads were refused: {refused}")
-    peaks.append(peak_mb(running))
-
-
-def peak_mb(running: Service) -> float:
-    """The most memory that the API has had."""
-    status = Path(f"/proc/{running.process.pid}/status").read_text()
-    return int(status.partition("VmHWM:")[2].split()[0]) / 1000
+    peaks.append(peak_mb(running.process.pid))
 
 
 def on_a_full_disk(seconds: float) -> dict[str, Seen]:

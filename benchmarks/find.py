@@ -32,6 +32,7 @@ from benchmarks.fields.cases import Case, cases
 from benchmarks.fields.engine import THREADS, Answer, Engine
 from benchmarks.fields.judging import share
 from benchmarks.fields.rendered import GROUNDS, LEAST_SHOWN, random_camera, shot, usual_field
+from benchmarks.printing import print_sections, table_head
 from benchmarks.rows import Rows
 from benchmarks.scenes import FOLDER as RUNS
 from benchmarks.scenes import seen_well
@@ -80,10 +81,7 @@ def main() -> None:
     options = parser.parse_args()
     cv2.setNumThreads(THREADS)
     engine = Engine(MODEL_PATH, Rows(options.rows))
-    for name in options.only:
-        print(f"\n## {name}\n", flush=True)
-        for line in sections[name](options, engine):
-            print(line, flush=True)
+    print_sections(options.only, sections, options, engine)
 
 
 def _rendered(options: argparse.Namespace, engine: Engine) -> Iterator[str]:
@@ -122,8 +120,9 @@ def _real(options: argparse.Namespace, engine: Engine) -> Iterator[str]:
 
 
 def _beside(options: argparse.Namespace, engine: Engine) -> Iterator[str]:
-    yield "| field | pairs | accepted and near | accepted on the wrong side | accepted, wrong | told by the ground |"
-    yield "|---" * 6 + "|"
+    yield table_head(
+        "field | pairs | accepted and near | accepted on the wrong side | accepted, wrong | told by the ground"
+    )
     everything = list[dict]()
     for name in (name for name in options.fields if grass in GROUNDS[name]):
         rows = [
@@ -149,11 +148,10 @@ def _beside_line(name: str, rows: Sequence[dict]) -> str:
 
 
 def _table(found: Mapping[tuple[str, str], Sequence[dict]], knowing: Sequence[str]) -> Iterator[str]:
-    yield (
-        "| field | known | views | accepted and near | of those a job accepts | accepted, wrong | near, not accepted "
-        "| core-s | longest |"
+    yield table_head(
+        "field | known | views | accepted and near | of those a job accepts | accepted, wrong | near, not accepted "
+        "| core-s | longest"
     )
-    yield "|---" * 9 + "|"
     total = {
         (f"all, {known}", known): [r for key, rows in found.items() if key[1] == known for r in rows]
         for known in knowing

@@ -20,6 +20,7 @@ from functools import cache, lru_cache, partial
 import numpy as np
 
 from benchmarks.methods import Seen, engine
+from benchmarks.printing import print_sections, table_head
 from benchmarks.rows import Rows
 from benchmarks.scenes import FOLDER, HOURS, LAYOUTS, Layout, Scene, as_built, placed_cameras, rendered, seen_well
 from benchmarks.truth import apart
@@ -79,16 +80,12 @@ def main() -> None:
         "--starts", type=int, default=6, help="outdated poses of each kind from which good frames begin"
     )
     options = parser.parse_args()
-    for name in options.only:
-        print(f"\n## {name}\n", flush=True)
-        for line in SECTIONS[name](HOURS[: options.lights], options.starts):
-            print(line, flush=True)
+    print_sections(options.only, SECTIONS, HOURS[: options.lights], options.starts)
 
 
 def good(lights: Sequence[str], starts: int) -> Iterator[str]:
     """Frames as they should be."""
-    yield "| rig | jobs | cameras | right within 3 sigma | of those refused | accepted, but not right |"
-    yield "|---|---|---|---|---|---|"
+    yield table_head("rig | jobs | cameras | right within 3 sigma | of those refused | accepted, but not right")
     for rig in RIGS:
         jobs = [
             _verdicts(rig, light, "good", start, number)
@@ -104,11 +101,10 @@ def good(lights: Sequence[str], starts: int) -> Iterator[str]:
 
 def spoiled(lights: Sequence[str], _starts: int) -> Iterator[str]:
     """Frames that show something else."""
-    yield (
-        "| what is wrong | jobs | cameras it is wrong with | accepted, wrong | accepted, right "
-        "| other cameras | accepted, right | accepted, wrong |"
+    yield table_head(
+        "what is wrong | jobs | cameras it is wrong with | accepted, wrong | accepted, right | other cameras "
+        "| accepted, right | accepted, wrong"
     )
-    yield "|---|---|---|---|---|---|---|---|"
     for kind in SPOILED:
         jobs = [
             _verdicts(rig, light, kind, start, 0)

@@ -28,6 +28,7 @@ import cv2
 import httpx
 import numpy as np
 
+from benchmarks.processes import peak_mb
 from testbed.running import SIZE, Service, png, png_of, wait_for
 
 TOGETHER, VENUES = 16, 16
@@ -60,7 +61,7 @@ def tried(folder: Path, seed: int, count: int) -> list[str]:
     try:
         for number in range(VENUES):
             service.venue(f"v{number}")
-        before, kinds = peak_mb(service), list(UPLOADS)
+        before, kinds = peak_mb(service.process.pid), list(UPLOADS)
         with ThreadPoolExecutor(TOGETHER) as clients:
             seen = list(
                 clients.map(lambda n: _sent(service, kinds[n % len(kinds)], Draw(f"{seed} {n}"), n), range(count))
@@ -69,7 +70,7 @@ def tried(folder: Path, seed: int, count: int) -> list[str]:
         harm = [
             f"{kind} was answered {answer}" for kind, answer, _ in seen if answer.startswith("5") and answer != "503"
         ]
-        after = peak_mb(service)
+        after = peak_mb(service.process.pid)
         print(f"\nMemory of the API: {before:.0f} MB before, {after:.0f} MB at most")
         if after > MOST_MB:
             harm.append(f"the API took {after:.0f} MB, at most {MOST_MB} are allowed")
@@ -84,12 +85,6 @@ def tried(folder: Path, seed: int, count: int) -> list[str]:
     harm += [f"the service ended with {code}"] if code else []
     harm += ["a traceback stands in the log"] if "Traceback" in (folder / "esc" / "log").read_text() else []
     return harm
-
-
-def peak_mb(service: Service) -> float:
-    """The most memory that the API has taken."""
-    status = Path(f"/proc/{service.process.pid}/status").read_text()
-    return int(status.partition("VmHWM:")[2].split()[0]) / 1000
 
 
 def _left(folder: Path) -> list[str]:

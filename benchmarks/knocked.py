@@ -33,6 +33,7 @@ from benchmarks.fields.engine import Engine
 from benchmarks.fields.judging import near, share
 from benchmarks.fields.rendered import LEAST_SHOWN, shot
 from benchmarks.find import NEAR, UNSEEN_PX, ends_alike, wrong_in_words, wrong_ones
+from benchmarks.printing import print_sections, table_head
 from benchmarks.rows import Rows
 from benchmarks.scenes import FOLDER as RUNS
 from benchmarks.scenes import scene
@@ -75,10 +76,7 @@ def main() -> None:
     parser.add_argument("--rows", type=Path, default=RUNS / "knocked.jsonl", help="the file of what has been run")
     options = parser.parse_args()
     engine = Engine(MODEL_PATH, Rows(options.rows))
-    for name in options.only:
-        print(f"\n## {name}\n", flush=True)
-        for line in sections[name](options, engine):
-            print(line, flush=True)
+    print_sections(options.only, sections, options, engine)
 
 
 def _rendered(options: argparse.Namespace, engine: Engine) -> Iterator[str]:
@@ -122,8 +120,7 @@ def _real(options: argparse.Namespace, engine: Engine) -> Iterator[str]:
 
 
 def _called(options: argparse.Namespace, engine: Engine) -> Iterator[str]:
-    yield "| venue | about | draws | found | called knocked | accepted | called otherwise | wrong | core-s |"
-    yield "|---" * 9 + "|"
+    yield table_head("venue | about | draws | found | called knocked | accepted | called otherwise | wrong | core-s")
     for name in TURNED_VENUES:
         rows = [
             engine.rows.remembered(
@@ -145,8 +142,7 @@ def _called(options: argparse.Namespace, engine: Engine) -> Iterator[str]:
 
 
 def _exchanged(options: argparse.Namespace, engine: Engine) -> Iterator[str]:
-    yield "| cameras exchanged | said so | taken for knocked | accepted | core-s |"
-    yield "|---|---|---|---|---|"
+    yield table_head("cameras exchanged | said so | taken for knocked | accepted | core-s")
     for name in VENUES:
         row = engine.rows.remembered(
             {"exchanged": name, "model": engine.name}, lambda name=name: _exchanged_row(name, engine)
@@ -287,11 +283,10 @@ def _within(rows: Sequence[dict], low: float, high: float) -> list[dict]:
 def _table(groups: dict[str, list[dict]], everything: Sequence[dict]) -> Iterator[str]:
     yield "Found: accepted or proposed. Wrong: found, and not near (of these, where a job ends that began right)."
     yield ""
-    yield (
-        "| cameras | draws | found and near | accepted at once | found and near of those a job accepts | wrong "
-        "| core-s | longest |"
+    yield table_head(
+        "cameras | draws | found and near | accepted at once | found and near of those a job accepts | wrong | core-s "
+        "| longest"
     )
-    yield "|---" * 8 + "|"
     for name, rows in {**groups, "knocked, all": list(everything)}.items():
         if rows:
             cores = [row["core_seconds"] for row in rows]

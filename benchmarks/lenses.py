@@ -18,6 +18,7 @@ from functools import cache, lru_cache
 import numpy as np
 
 from benchmarks.methods import Seen, engine
+from benchmarks.printing import print_sections, table_head
 from benchmarks.rows import Rows
 from benchmarks.scenes import FOLDER, HOURS, SIZE, Scene, rendered, seen_well
 from benchmarks.truth import apart
@@ -37,17 +38,15 @@ VIEWS = {
     "corner": ((42.0, 24.0), 34.0),
 }
 ZOOMS = (0.0, 0.001, 0.003, 0.01, 0.02)
-# What a poor board leaves: pixels, coefficients, ratio of the focal lengths.
-POOR = {"cx": 5.0, "cy": 5.0, "k1": 0.003, "k2": 0.005, "aspect": 0.001}
+# What a good board leaves: part of the focal length, pixels, a coefficient.
 BOARD = {"focal": 3e-4, "cx": 1.0, "cy": 1.0, "k1": 5e-4}
 WIND_M, WIND_DEG = 0.02, 0.05
 FARTHEST_M, SIGMAS = 0.3, 3.0
-FOUND, UNCHANGED = 5e-4, 1e-6
 
 
 @dataclass(frozen=True)
 class Row:
-    """One run: errors and sigmas of a pose, whether it was accepted, and of the focal length answered (parts of it)."""
+    """One run: errors and sigmas of a pose, and whether it was accepted."""
 
     focal: float
     view: str
@@ -56,8 +55,6 @@ class Row:
     sigma_m: float
     sigma_deg: float
     accepted: bool
-    focal_off: float
-    focal_sigma: float
     because: str | None
 
     @property
@@ -72,10 +69,7 @@ def main() -> None:
     parser.add_argument("--only", nargs="+", choices=SECTIONS, default=list(SECTIONS))
     parser.add_argument("--views", type=int, default=4, help="frames of each view and focal length")
     options = parser.parse_args()
-    for name in options.only:
-        print(f"\n## {name}\n", flush=True)
-        for line in SECTIONS[name](options.views):
-            print(line, flush=True)
+    print_sections(options.only, SECTIONS, options.views)
 
 
 def zoom(views: int) -> Iterator[str]:
@@ -83,39 +77,11 @@ def zoom(views: int) -> Iterator[str]:
     yield from _table([(f"{part:.1%}", {"focal": part}) for part in ZOOMS], views)
 
 
-def poor_board(views: int) -> Iterator[str]:
-    """Numbers of the lens that are wrong by what a poor board leaves."""
-    yield from _table([(f"{name} {by:g}", {name: by}) for name, by in POOR.items()], views)
-
-
-def drift(views: int) -> Iterator[str]:
-    """The same focal lengths where the venue lets its lens drift: whether another one is answered, and how near."""
-    yield (
-        "| focal length off by | runs | accepted | accepted, too far off | another one found "
-        "| of those, within 2 sigma | with a sigma below 0.05 % | of those, within 0.05 % |"
-    )
-    yield "|---|---|---|---|---|---|---|---|"
-    for part in ZOOMS:
-        rows = [
-            (sign * part, _row(focal, view, number, {"focal": sign * part}, may_drift=True))
-            for focal in FOCAL_LENGTHS
-            for view in VIEWS
-            for number in range(views)
-            for sign in [(-1) ** number]
-        ]
-        # What a venue says of a lens that is longer by a part is that much shorter.
-        found = [row for by, row in rows if row.accepted and abs(row.focal_off - (1 / (1 + by) - 1)) > UNCHANGED]
-        covered = sum(abs(row.focal_off) < 2 * row.focal_sigma for row in found)
-        told = [row for row in found if row.focal_sigma < FOUND]
-        near = sum(abs(row.focal_off) < FOUND for row in told)
-        taken, wrong = sum(row.accepted for _, row in rows), sum(row.wrong for _, row in rows)
-        yield f"| {part:.1%} | {len(rows)} | {taken} | {wrong} | {len(found)} | {covered} | {len(told)} | {near} |"
-
-
 def honesty(views: int) -> Iterator[str]:
     """Errors over sigma with lenses as a good board leaves them: near 1 if sigma is what it says."""
-    yield "| focal length, px | runs | accepted | error / sigma: position, rms | inside 2 | rotation, rms | inside 2 |"
-    yield "|---|---|---|---|---|---|---|"
+    yield table_head(
+        "focal length, px | runs | accepted | error / sigma: position, rms | inside 2 | rotation, rms | inside 2"
+    )
     for focal in FOCAL_LENGTHS:
         rows = []
         for view in VIEWS:
@@ -132,11 +98,10 @@ def honesty(views: int) -> Iterator[str]:
 
 
 def _table(cases: Sequence[tuple[str, dict[str, float]]], views: int) -> Iterator[str]:
-    yield (
-        "| lens off by | runs | accepted | accepted, too far off | error, cm, median (most) | of those accepted, most "
-        "| error / sigma, most |"
+    yield table_head(
+        "lens off by | runs | accepted | accepted, too far off | error, cm, median (most) | of those accepted, most "
+        "| error / sigma, most"
     )
-    yield "|---|---|---|---|---|---|---|"
     for label, wrong in cases:
         rows = [
             _row(focal, view, number, {name: by * (-1) ** number for name, by in wrong.items()})
@@ -154,13 +119,13 @@ def _table(cases: Sequence[tuple[str, dict[str, float]]], views: int) -> Iterato
         )
 
 
-SECTIONS = {"zoom": zoom, "drift": drift, "poor-board": poor_board, "honesty": honesty}
+SECTIONS = {"zoom": zoom, "honesty": honesty}
 
 
-def _row(focal: float, view: str, number: int, wrong: dict[str, float], *, may_drift: bool = False) -> Row:
+def _row(focal: float, view: str, number: int, wrong: dict[str, float]) -> Row:
     """The row of a run, from the file or run now and appended to it."""
-    key = {"focal": focal, "view": view, "number": number, "wrong": wrong, "may_drift": may_drift}
-    row = _rows().remembered(key, lambda: vars(_run(focal, view, number, wrong, may_drift)))
+    key = {"focal": focal, "view": view, "number": number, "wrong": wrong}
+    row = _rows().remembered(key, lambda: vars(_run(focal, view, number, wrong)))
     return Row(**{name: value for name, value in row.items() if name != "key"})
 
 
@@ -169,13 +134,13 @@ def _rows() -> Rows:
     return Rows(FOLDER / "lenses.jsonl")
 
 
-def _run(focal: float, view: str, number: int, wrong: dict[str, float], may_drift: bool) -> Row:
+def _run(focal: float, view: str, number: int, wrong: dict[str, float]) -> Row:
     seen = _seen(focal, view, number)
     real = seen.scene.real[0]
-    believed = replace(real, intrinsics=_lens(real.intrinsics, wrong))
+    believed = replace(real, intrinsics=lens_given_wrong(real.intrinsics, wrong))
     rng = np.random.default_rng([3, int(focal), number])
     stored = believed.with_pose(outdated(believed.pose, WIND_M, WIND_DEG, rng))
-    said = engine(lens_may_drift=may_drift)(seen, [stored], number).said
+    said = engine()(seen, [stored], number).said
     assert said is not None
     one = said.cameras[0]
     shift, turn = apart(one.camera, real)
@@ -188,8 +153,6 @@ def _run(focal: float, view: str, number: int, wrong: dict[str, float], may_drif
         np.inf if sigma is None else sigma.position_m,
         np.inf if sigma is None else sigma.rotation_deg,
         said.accepted,
-        one.camera.intrinsics.focal_length_px / focal - 1,
-        np.inf if one.zoom is None else one.zoom.sigma / focal,
         said.rejected_because,
     )
 
@@ -218,7 +181,7 @@ def camera_of_view(focal: float, view: str, rng: np.random.Generator) -> Camera:
     return Camera("camera", lens, Pose.looking_at(np.array([*target, 0.0]) + away, np.array([*target, 0.0])))
 
 
-def _lens(real: Lens, wrong: dict[str, float]) -> Lens:
+def lens_given_wrong(real: Lens, wrong: dict[str, float]) -> Lens:
     """What a venue says of a lens that is really longer, and so on, by the numbers of `wrong`."""
     matrix, distortion = real.matrix.copy(), real.distortion.copy()
     matrix[[0, 1], [0, 1]] /= 1 + wrong.get("focal", 0.0)

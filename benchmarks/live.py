@@ -22,6 +22,8 @@ import numpy as np
 
 from benchmarks import live_faults, live_recovery
 from benchmarks.live_running import Film, LiveRun, running
+from benchmarks.printing import table_head
+from benchmarks.processes import core_s, resident_mb
 from benchmarks.shaking import SIZES, clips
 from testbed.rtsp import has_server
 
@@ -71,13 +73,13 @@ def quiet(film: Film, seconds: float, every: int, cameras: int) -> None:
         ends_at = time.monotonic() + seconds
         while time.monotonic() < ends_at:
             time.sleep(min(MEMORY_EVERY_S, max(0.0, ends_at - time.monotonic())))
-            memory_mb.append(run.memory_mb())
-        core_s = run.core_s()
+            memory_mb.append(resident_mb(run.process.pid))
+        spent_s = core_s(run.process.pid)
     pictures = max(1, sum(map(len, run.taken.values())))
     print(f"\n{seconds:g} s in which nothing happens.\n")
     print("\n".join(table(run)))
     print(
-        f"\n{1000 * core_s / pictures:.1f} core-ms for each picture taken, decoding and the start counted in; "
+        f"\n{1000 * spent_s / pictures:.1f} core-ms for each picture taken, decoding and the start counted in; "
         f"{memory_mb[len(memory_mb) // 3]:.0f} MB after a third of the time, {memory_mb[-1]:.0f} at its end.",
         flush=True,
     )
@@ -85,16 +87,18 @@ def quiet(film: Film, seconds: float, every: int, cameras: int) -> None:
 
 def rates(size: str, seconds: float) -> None:
     """Run one to four cameras at each rate; a row for each, as it ends."""
-    print("| cameras | pictures a second | cores | measured | turn, ° rms | taken to sent, ms: p50, p99 |")
-    print("|---" * 6 + "|", flush=True)
+    print(
+        table_head("cameras | pictures a second | cores | measured | turn, ° rms | taken to sent, ms: p50, p99"),
+        flush=True,
+    )
     for rate in RATES:
         for count in range(1, MOST_CAMERAS + 1):
             _, made = clips(size, count=count)
             with running(made, {}, Film(size, rate), "--follow-every", "1") as run:
                 time.sleep(START_S)
-                begun_ns, core_s = time.time_ns(), run.core_s()
+                begun_ns, spent_s = time.time_ns(), core_s(run.process.pid)
                 time.sleep(seconds)
-                cores, end_ns = (run.core_s() - core_s) / seconds, time.time_ns()
+                cores, end_ns = (core_s(run.process.pid) - spent_s) / seconds, time.time_ns()
             # What was taken before has been sent by then, or never is.
             judged = [one for name in run.names for one in run.judged(name, begun_ns, end_ns)]
             measured = [one for one in judged if one.sent.status == "measured"]

@@ -20,6 +20,7 @@ import cv2
 import numpy as np
 
 from benchmarks.live_running import Film, LiveRun, running
+from benchmarks.processes import core_s, resident_mb
 from benchmarks.shaking import Clip, clips, resized
 from demo.render import FIELD, cameras
 from worker.calibration.geometry.camera import Camera, Pose
@@ -125,12 +126,14 @@ def run_soak(film: Film, every: int, minutes: float) -> None:
             phases.append(Phase(fault.name, first, scene.begun_ns, scene.end_ns, scene.mended_ns))
             phases.append(Phase("something, to the other camera", other, scene.begun_ns, scene.end_ns))
         over.set()
-        core_s = run.core_s()
+        spent_s = core_s(run.process.pid)
     print(f"\n{minutes:g} minutes, {quiet_s:g} s without a fault between two of them.\n")
     print("\n".join(soak_table(run, phases)))
     pictures = sum(map(len, run.taken.values()))
-    print(f"\n{1000 * core_s / pictures:.1f} core-ms for each picture taken. Resident memory at the beginning and then")
-    print(f"every minute, MB: {', '.join(f'{each:.0f}' for each in memory_mb)}")
+    print(f"\n{1000 * spent_s / pictures:.1f} core-ms for each picture taken.")
+    print(
+        f"Resident memory at the beginning and then every minute, MB: {', '.join(f'{each:.0f}' for each in memory_mb)}"
+    )
     said = Counter(words for _, words in run.warnings)
     print("\nSaid, and how often:")
     print("\n".join(f"  {times} x {words}" for words, times in said.most_common()), flush=True)
@@ -149,9 +152,9 @@ class Phase:
 
 def note_memory(run: LiveRun, memory_mb: list[float], over: threading.Event) -> None:
     """Note the memory of `esc live` at once and every minute, until it is over."""
-    memory_mb.append(run.memory_mb())
+    memory_mb.append(resident_mb(run.process.pid))
     while not over.wait(MEMORY_EVERY_S):
-        memory_mb.append(run.memory_mb())
+        memory_mb.append(resident_mb(run.process.pid))
 
 
 def soak_table(run: LiveRun, phases: Sequence[Phase]) -> list[str]:

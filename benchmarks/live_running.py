@@ -30,7 +30,6 @@ from worker.calibration.geometry.rotation import rotation_angles_deg
 FOLDER, VENUE = Path("build/live"), "demo"
 # After so many pictures of a clip the motion of its camera is as it was.
 PERIOD = round(FRAMES_PER_SECOND / SWING_HZ)
-TICKS_PER_S = os.sysconf("SC_CLK_TCK")
 # A pose belongs to a picture that was taken no farther from its time than this.
 SAME_MS = 15.0
 
@@ -121,16 +120,6 @@ class LiveRun:
         """Keep what comes, in threads."""
         for read in (self._note_taken, self._note_sent, self._note_warnings):
             threading.Thread(target=read, daemon=True).start()
-
-    def memory_mb(self) -> float:
-        """Resident memory of `esc live`."""
-        status = Path(f"/proc/{self.process.pid}/status").read_text()
-        return next(int(line.split()[1]) / 1000 for line in status.splitlines() if line.startswith("VmRSS"))
-
-    def core_s(self) -> float:
-        """Core-seconds of `esc live` since it began."""
-        fields = Path(f"/proc/{self.process.pid}/stat").read_text().rpartition(")")[2].split()
-        return (int(fields[11]) + int(fields[12])) / TICKS_PER_S
 
     def judged(self, camera: str, begin_ns: float = 0, end_ns: float = math.inf) -> list[JudgedPose]:
         """The poses of a camera that were sent in a time, of which it is known by the camera's clock when they were."""

@@ -29,6 +29,7 @@ import psycopg
 import sqlalchemy as sa
 from prometheus_client.parser import text_string_to_metric_families
 
+from benchmarks.processes import core_s
 from service.schemas.geometry import Moved, Pose
 from service.schemas.job import Progress
 from service.schemas.options import Options
@@ -55,7 +56,6 @@ WARMING_UP_S = 15.0
 # What a start leaves to be done.
 SETTLING_S = 5.0
 STAND_IN = "stand-in for the engine"
-TICKS_PER_S = os.sysconf("SC_CLK_TCK")
 
 
 @dataclass
@@ -319,7 +319,7 @@ def state_of(database_url: str) -> dict[str, float]:
 
 def cpu_s(processes: list[subprocess.Popen], *, children: bool = False) -> float:
     """Seconds of processor time of processes; `children`: and of those that they have waited for."""
-    return sum(ticks(process.pid, children=children) for process in processes) / TICKS_PER_S
+    return sum(core_s(process.pid, children=children) for process in processes)
 
 
 def cpu_s_of_postgres(database_url: str) -> float:
@@ -327,18 +327,12 @@ def cpu_s_of_postgres(database_url: str) -> float:
         file = connection.execute("SELECT setting FROM pg_settings WHERE name = 'data_directory'").fetchone()[0]
     postmaster = int((Path(file) / "postmaster.pid").read_text().split()[0])
     backends = [int(child) for child in Path(f"/proc/{postmaster}/task/{postmaster}/children").read_text().split()]
-    spent = 0
+    spent = 0.0
     for backend in backends:
         # One that has ended meanwhile is among those that the postmaster has waited for.
         with suppress(FileNotFoundError):
-            spent += ticks(backend, children=False)
-    return (spent + ticks(postmaster, children=True)) / TICKS_PER_S
-
-
-def ticks(process: int, *, children: bool) -> int:
-    """User and system time; proc(5)."""
-    fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
-    return sum(int(value) for value in fields[11 : 15 if children else 13])
+            spent += core_s(backend)
+    return spent + core_s(postmaster, children=True)
 
 
 def report(

@@ -82,19 +82,19 @@ class Scene:
     frames: dict[str, list[Frame]]
 
 
-def scene(name: str, light: str | None = None) -> Scene:
-    """A venue of `VENUES`, under its own light or another one."""
-    layout, crown, usual, matches = VENUES[name]
+def scene(name: str) -> Scene:
+    """Return a venue of `VENUES`, under its light."""
+    layout, crown, light, matches = VENUES[name]
     number = list(VENUES).index(name)
     rng = np.random.default_rng([7, number])
     pitch = Field(105.0, 68.0, 0.12, np.array([[-18.5, 0.0, crown], [18.5, 0.0, crown]]))
     believed = placed_cameras(LAYOUTS[layout], rng)
     real = believed if matches else [as_built(camera, rng) for camera in believed]
-    drawn = Conditions.named(light or usual, np.random.default_rng([8, number]))
+    drawn = Conditions.named(light, np.random.default_rng([8, number]))
     amiss = 0.0 if matches else 1.0
     conditions = seen_well(drawn, fringe=0.3 * amiss, swell=amiss, wobble=amiss)
     frames = {
-        camera.id: [rendered(f"{name}-{light or usual}-{camera.id}".replace(" ", "-"), pitch, camera, conditions)]
+        camera.id: [rendered(f"{name}-{light}-{camera.id}".replace(" ", "-"), pitch, camera, conditions)]
         for camera in real
     }
     return Scene(name, matches, pitch, believed, real, frames)

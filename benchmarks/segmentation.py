@@ -19,6 +19,7 @@ import cv2
 import numpy as np
 import torch
 
+from benchmarks.printing import print_sections
 from models import MODEL_PATH
 from models.training import ablation
 from models.training.evaluate import by_condition, read_venue, real, rendered
@@ -48,8 +49,7 @@ def main() -> None:
     if options.measure:
         print(json.dumps(measured(PASSES[options.measure])))
         return
-    for name in options.only:
-        print(f"\n## {name}\n", *SECTIONS[name](options), sep="\n", flush=True)
+    print_sections(options.only, SECTIONS, options)
 
 
 def four_k(_options: argparse.Namespace) -> list[str]:

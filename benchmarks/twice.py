@@ -1,13 +1,12 @@
 """`make bench-truth ONLY=twice`: whether an answer vouches for the lens and the field that it was found with.
 
-    python -m benchmarks.twice --only measured
-    python -m benchmarks.twice --only rendered --focals 4000
+    python -m benchmarks.twice --focals 4000
 
 A venue begins with what a search found through the lens and on the field that somebody gave, which may be wrong: too
 long, of pixels that are not as high as said, of another size, out of square. From there: its first jobs, a change of
 the field that forgets them (`patch`), a restore that drops them (`restore`), and the refined pose and lens of its last
 job stored in place of its own (`adopt`). Wrong is what is found or accepted beyond three of its sigmas, or 30 cm.
-Sections: `measured`, lines without pictures; `rendered`, pictures, the network, and a search for the camera.
+Lines are measured without pictures.
 """
 
 from __future__ import annotations
@@ -16,26 +15,22 @@ import argparse
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-import cv2
 import numpy as np
 
-from benchmarks.lenses import FARTHEST_M, FOCAL_LENGTHS, PITCH, SIGMAS, VIEWS, Seen, _lens, _seen, camera_of_view
+from benchmarks.lenses import FARTHEST_M, FOCAL_LENGTHS, PITCH, SIGMAS, VIEWS, camera_of_view, lens_given_wrong
 from benchmarks.nights.single import LEAST_WRONG_M
+from benchmarks.printing import table_head
 from benchmarks.truth import apart
 from demo.render import outdated
-from models import MODEL_PATH
 from testbed.simulated_nights import SHARED_PX, Installation, Painted, SimulatedSight
-from worker.calibration.calibrate import calibrate
-from worker.calibration.find_cameras import find_cameras, why_lens_unfit
+from worker.calibration.find_cameras import why_lens_unfit
 from worker.calibration.gate.quality import CameraResult
-from worker.calibration.geometry.camera import Camera, Frame
+from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.field import Field, LinePoints
 from worker.calibration.geometry.visibility import VisibleLines
 from worker.calibration.memory.camera_memory import CameraMemory
-from worker.calibration.records import Options
 from worker.calibration.refinement.diagnosis import find_suspicions
 from worker.calibration.refinement.refine import refine
-from worker.calibration.relocalisation.sought import SoughtCamera, SoughtLens
 
 
 @dataclass(frozen=True)
@@ -58,7 +53,9 @@ class Mistake:
 
     def given(self, real: Camera) -> Camera:
         """The camera with the lens that is said."""
-        return real.with_lens(_lens(real.intrinsics, {name: 1 / (1 + by) - 1 for name, by in self.lens.items()}))
+        return real.with_lens(
+            lens_given_wrong(real.intrinsics, {name: 1 / (1 + by) - 1 for name, by in self.lens.items()})
+        )
 
     def displaced(self, lines: LinePoints) -> np.ndarray:
         """Where the line points (N, 3) of `PITCH` really are."""
@@ -83,13 +80,10 @@ MISTAKES = [
     Mistake("nothing, length and width known to 1 m", sigma_m=1.0),
     *(Mistake(f"skew {skew_m} m", skew_m=skew_m) for skew_m in (0.1, 0.2, 0.3)),
 ]
-LENS_MISTAKES = MISTAKES[:5]
-"""Those that a rendered frame has."""
 STEPS = ("find", "job", "job", "job", "patch", "restore", "adopt", "adopt")
 REPAINTED_M = PITCH.line_width + 0.001
 """Lines that are said to be a millimetre wider: what was remembered is of another field."""
 WIND_M, WIND_DEG, FOUND_M, FOUND_DEG = 0.005, 0.01, 0.02, 0.03
-NOISE = 2.5
 
 
 @dataclass(frozen=True)
@@ -116,23 +110,15 @@ class Answer:
 def main() -> None:
     """Run what is asked for and print it."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    sections = {"measured": (_measured, MISTAKES), "rendered": (_rendered, LENS_MISTAKES)}
-    parser.add_argument("--only", nargs="+", choices=sections, default=list(sections))
     parser.add_argument("--focals", nargs="+", type=float, default=list(FOCAL_LENGTHS))
-    options = parser.parse_args()
-    for name in options.only:
-        print(f"\n## {name}\n", flush=True)
-        for line in _table(options.focals, *sections[name]):
-            print(line, flush=True)
+    for line in _table(parser.parse_args().focals):
+        print(line, flush=True)
 
 
-def _table(
-    focals: Sequence[float], life: Callable[[float, str, Mistake], list[Answer]], mistakes: Sequence[Mistake]
-) -> Iterator[str]:
-    yield "| given wrong | step | answers | accepted | wrong | error of accepted, cm, most | over sigma |"
-    yield "|---|---|---|---|---|---|---|"
-    for mistake in mistakes:
-        lives = [life(focal, view, mistake) for focal in focals for view in VIEWS]
+def _table(focals: Sequence[float]) -> Iterator[str]:
+    yield table_head("given wrong | step | answers | accepted | wrong | error of accepted, cm, most | over sigma")
+    for mistake in MISTAKES:
+        lives = [_life(focal, view, mistake) for focal in focals for view in VIEWS]
         for step in dict.fromkeys(STEPS):
             answers = [one for life in lives for one, name in zip(life, STEPS, strict=False) if name == step]
             taken = [one for one in answers if one.accepted]
@@ -143,7 +129,7 @@ def _table(
             yield f"| {mistake.name} | {step} | {counts} | {100 * most:.1f} | {ratio:.1f} |"
 
 
-def _measured(focal: float, view: str, mistake: Mistake) -> list[Answer]:
+def _life(focal: float, view: str, mistake: Mistake) -> list[Answer]:
     rng = np.random.default_rng([41, int(focal), list(VIEWS).index(view)])
     real = camera_of_view(focal, view, rng)
     painted = Painted.drawn(PITCH, rng)
@@ -177,39 +163,6 @@ def _measured(focal: float, view: str, mistake: Mistake) -> list[Answer]:
     return [answer, *_later(found, real, night)] if is_found else [answer]
 
 
-def _rendered(focal: float, view: str, mistake: Mistake) -> list[Answer]:
-    seen: Seen = _seen(focal, view, 0)
-    (real,), rng = seen.scene.real, np.random.default_rng([43, int(focal), list(VIEWS).index(view)])
-    (frame,) = seen.scene.frames[real.id]
-    given = mistake.given(real)
-
-    def tonight() -> Frame:
-        noisy = frame + np.float32(NOISE) * rng.standard_normal(frame.shape, dtype=np.float32)
-        return np.clip(noisy + 0.5, 0, 255).astype(np.uint8)
-
-    def night(width_m: float, stored: Camera, memory: CameraMemory | None) -> tuple[CameraResult, CameraMemory | None]:
-        memories = {} if memory is None else {real.id: memory}
-        pitch = replace(PITCH, line_width=width_m)
-        said = calibrate(pitch, [stored], {real.id: [tonight()]}, seen.segmenter, Options(), memories=memories)
-        return said.cameras[0], said.memories.get(real.id, memory)
-
-    sought = SoughtCamera(real.id, [SoughtLens.known(given.intrinsics)])
-    found = find_cameras(PITCH, [sought], [], {real.id: [tonight()]}, seen.segmenter, 0).cameras[0]
-    if not found.candidates or found.candidates[0].sigma is None:
-        return [Answer(np.inf, np.inf, accepted=False)]
-    best = found.candidates[0]
-    there = _on_this_side(best.camera, real)
-    answer = Answer(apart(there, real)[0], best.sigma.position_m, found.accepted)
-    return [answer, *_later(there, real, night)] if found.accepted else [answer]
-
-
-def _on_this_side(found: Camera, real: Camera) -> Camera:
-    """The found camera, or its twin: a football field looks the same from both sides."""
-    from worker.calibration.relocalisation.relocalise import twin
-
-    return min(found, twin(found), key=lambda one: apart(one, real)[0])
-
-
 def _later(
     found: Camera,
     real: Camera,
@@ -233,6 +186,4 @@ def _later(
 
 
 if __name__ == "__main__":
-    cv2.setNumThreads(1)
-    assert MODEL_PATH.exists()
     main()

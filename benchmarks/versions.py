@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
+from benchmarks.printing import table_head
 from benchmarks.service.stage import homes
 from testbed.homes import Home, environment
 from testbed.released import Release, is_in_git, worker_beside
@@ -37,8 +38,10 @@ def main() -> int:
     wrong = 0
     with tempfile.TemporaryDirectory(prefix="esc-versions-") as name, homes() as both:
         release = Release(Path(name) / "release")
-        print("| home | pairing | jobs | succeeded | at the first attempt | moved their venue once |")
-        print("|---|---|---|---|---|---|")
+        print(
+            table_head("home | pairing | jobs | succeeded | at the first attempt | moved their venue once"),
+            flush=True,
+        )
         for number, (title, home) in enumerate(both.items()):
             for pairing in (*PAIRINGS, UPGRADE):
                 folder = Path(name) / f"{number}-{pairing.replace(' ', '-')}"

@@ -20,6 +20,7 @@ import cv2
 
 from benchmarks.fields import real, rendered, views
 from benchmarks.fields.engine import THREADS, Engine
+from benchmarks.printing import print_sections
 from benchmarks.rows import Rows
 from benchmarks.scenes import FOLDER as RUNS
 from fields.template import NAMES
@@ -52,10 +53,7 @@ def main() -> None:
         options.pictures.mkdir(parents=True, exist_ok=True)
     cv2.setNumThreads(THREADS)
     engine = Engine(options.model, Rows(options.rows))
-    for name in options.only:
-        print(f"\n## {name}\n", flush=True)
-        for line in SECTIONS[name](options, engine):
-            print(line, flush=True)
+    print_sections(options.only, SECTIONS, options, engine)
 
 
 if __name__ == "__main__":

@@ -13,6 +13,7 @@ from benchmarks.fields.cases import FOLDER, Case, cases, started
 from benchmarks.fields.engine import Engine, camera_row
 from benchmarks.fields.judging import near, outcome, reasons, share
 from benchmarks.fields.seeing import seen
+from benchmarks.printing import table_head
 from benchmarks.truth import apart
 
 __all__ = ["FOLDER", "section"]
@@ -40,11 +41,10 @@ def _seeing(chosen: Sequence[Case], engine: Engine) -> Iterator[str]:
     yield "found f and chance c. Precision: the part that is line if lines which can be seen are found whatever chance"
     yield "does and the others by chance, (f - c) / (f (1 - c))."
     yield ""
-    yield (
-        "| source | frames | network: recall (least) | precision | evidence: found (least) | by chance "
-        "| beyond chance | precision | view, s (core-s) | network, s (core-s) | evidence, s (core-s) |"
+    yield table_head(
+        "source | frames | network: recall (least) | precision | evidence: found (least) | by chance | beyond chance "
+        "| precision | view, s (core-s) | network, s (core-s) | evidence, s (core-s)"
     )
-    yield "|---" * 11 + "|"
     for source, rows in sources.items():
         recall, found, chance = ([row[name] for row in rows] for name in ("recall", "found", "by_chance"))
         precision = [row["precision"] for row in rows if row["precision"] is not None]
@@ -58,8 +58,7 @@ def _seeing(chosen: Sequence[Case], engine: Engine) -> Iterator[str]:
             f"| {_times(rows, 'view_s')} | {_times(rows, 'network_s')} | {_times(rows, 'evidence_s')} |"
         )
     yield ""
-    yield "| source | marking | network: recall | evidence: found |"
-    yield "|---|---|---|---|"
+    yield table_head("source | marking | network: recall | evidence: found")
     for source, rows in sources.items():
         by_network, by_both = (_by_kind(row[f"{name}_by_marking"] for row in rows) for name in ("recall", "found"))
         for kind in sorted(by_network, key=by_network.__getitem__):

@@ -13,6 +13,7 @@ import numpy as np
 
 from benchmarks.fields.engine import Engine, camera_row
 from benchmarks.fields.judging import caught, far_off, overconfident, reasons, share
+from benchmarks.printing import table_head
 from benchmarks.scenes import started
 from benchmarks.truth import apart
 from fields.template import load
@@ -86,11 +87,10 @@ def section(options: argparse.Namespace, engine: Engine) -> Iterator[str]:
         "lines (too dark, veiled, hidden), only what was accepted counts."
     )
     yield ""
-    yield (
-        "| template | clear views | right | accepted, not as near | far off | beyond 3 sigma | refused "
-        "| off (sigma), cm | off (sigma), ° | unclear views | accepted | far off | beyond 3 sigma |"
+    yield table_head(
+        "template | clear views | right | accepted, not as near | far off | beyond 3 sigma | refused | off (sigma), cm "
+        "| off (sigma), ° | unclear views | accepted | far off | beyond 3 sigma"
     )
-    yield "|---" * 13 + "|"
     for name, judged in [*rows.items(), ("all", [row for each in rows.values() for row in each])]:
         yield _line(name, judged)
     yield ""

@@ -16,6 +16,7 @@ from benchmarks.fields.cases import Case, cases, started
 from benchmarks.fields.engine import Engine, camera_row
 from benchmarks.fields.judging import reasons, share
 from benchmarks.fields.rendered import LEAST_SHOWN, shot
+from benchmarks.printing import table_head
 from benchmarks.truth import apart
 from worker.calibration.detection.view_condition import UsualView, look_at
 from worker.calibration.gate.quality import Gate
@@ -90,8 +91,7 @@ def _table(kind: str, views: Sequence[View], options: argparse.Namespace, engine
             rows[name].append(row)
     yield f"{kind}; stored poses {options.turn:g}° and {options.shift:g} cm off; near: within 30 cm and 1°."
     yield ""
-    yield "| picture | views | accepted | of these near | cause named right | causes | refused because |"
-    yield "|---|---|---|---|---|---|---|"
+    yield table_head("picture | views | accepted | of these near | cause named right | causes | refused because")
     for name, judged in rows.items():
         causes = Counter(row.get("cause") or "none" for row in judged)
         accepted = [row for row in judged if row["accepted"]]

@@ -15,6 +15,7 @@ import argparse
 from concurrent.futures import ProcessPoolExecutor
 
 from benchmarks.nights import rendered, single, venues, year
+from benchmarks.printing import print_sections
 
 SECTIONS = {"single": single.table, "venues": venues.table, "rendered": rendered.table, "year": year.table}
 
@@ -29,10 +30,7 @@ def main() -> None:
     parser.add_argument("--processes", type=int, default=2)
     options = parser.parse_args()
     with ProcessPoolExecutor(options.processes) as executor:
-        for name in options.only:
-            print(f"\n## {name}\n", flush=True)
-            for line in SECTIONS[name](executor, options.number):
-                print(line, flush=True)
+        print_sections(options.only, SECTIONS, executor, options.number)
 
 
 if __name__ == "__main__":

@@ -17,6 +17,7 @@ import numpy as np
 
 from benchmarks.lenses import PITCH, camera_of_view
 from benchmarks.nights.single import FOUND_DEG, FOUND_M, Job
+from benchmarks.printing import rms, table_head
 from benchmarks.scenes import FOLDER, rendered, seen_well
 from benchmarks.service.load import ENGINE
 from benchmarks.service.stage import service
@@ -71,12 +72,11 @@ class RenderedJob(Job):
 
 def table(executor: Executor, number: int) -> Iterator[str]:
     """A row for each view and lens; `number` cameras of each."""
-    yield (
-        "| view | lens | jobs | accepted | of these wrong | worst error, cm | worst error / sigma "
-        "| refined: rms, cm | error / sigma, rms | change named, night | error before, cm, most "
-        "| change off by, %, most (over sigma) | core-s, median |"
+    yield table_head(
+        "view | lens | jobs | accepted | of these wrong | worst error, cm | worst error / sigma | refined: rms, cm "
+        "| error / sigma, rms | change named, night | error before, cm, most | change off by, %, most (over sigma) "
+        "| core-s, median"
     )
-    yield "|---" * 13 + "|"
     for view in FOCAL_LENGTHS:
         # Before the sequences, several of which read the same pictures.
         pictures = [(view, n, light) for n in range(number) for light in LIGHTS]
@@ -105,15 +105,11 @@ def _row(view: str, lens: str, sequences: Sequence[Sequence[RenderedJob]]) -> st
         f"| {view} | {lens} | {len(jobs)} | {len(taken)} | {sum(job.wrong for job in jobs)} "
         f"| {100 * max((job.error_m for job in taken), default=0.0):.1f} "
         f"| {max((job.error_m / job.sigma_m for job in taken), default=0.0):.1f} "
-        f"| {100 * _rms([job.refined_m for job in refined]):.1f} "
-        f"| {_rms([job.refined_m / job.refined_sigma_m for job in refined]):.2f} "
+        f"| {100 * rms([job.refined_m for job in refined]):.1f} "
+        f"| {rms([job.refined_m / job.refined_sigma_m for job in refined]):.2f} "
         f"| {nights} | {100 * max(before, default=0.0):.1f} | {change} "
         f"| {np.median([job.core_s for job in jobs]):.1f} |"
     )
-
-
-def _rms(values: Sequence[float]) -> float:
-    return float(np.sqrt(np.mean(np.square(values)))) if values else 0.0
 
 
 def _sequence(view: str, number: int, lens: str) -> list[RenderedJob]:

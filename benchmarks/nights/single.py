@@ -10,6 +10,7 @@ import numpy as np
 
 from benchmarks.lenses import FARTHEST_M, FOCAL_LENGTHS, PITCH, SIGMAS, VIEWS, camera_of_view
 from benchmarks.nights.changes import CHANGES, LONG, Change, Night
+from benchmarks.printing import rms, table_head
 from benchmarks.scenes import as_built
 from benchmarks.truth import apart
 from demo.render import outdated
@@ -50,11 +51,10 @@ class Job:
 
 def table(executor: Executor, number: int) -> Iterator[str]:
     """A row for each change: every view at every focal length, `number` cameras of each."""
-    yield (
-        "| what happens | jobs | accepted | accepted and wrong | error, cm, median (most) "
-        "| error / sigma, most | refined: rms, cm | error / sigma, rms | change named | error before, cm, most |"
+    yield table_head(
+        "what happens | jobs | accepted | accepted and wrong | error, cm, median (most) | error / sigma, most "
+        "| refined: rms, cm | error / sigma, rms | change named | error before, cm, most"
     )
-    yield "|---|---|---|---|---|---|---|---|---|---|"
     for changes, views in ((CHANGES, tuple(VIEWS)), (LONG, LONG_VIEWS)):
         cases = [(focal, view, n) for focal in FOCAL_LENGTHS for view in views for n in range(number)]
         for name in changes:
@@ -80,7 +80,7 @@ def _row(name: str, change: Change, sequences: Sequence[Sequence[Job]]) -> str:
         f"| {name} | {len(jobs)} | {len(taken) / len(jobs):.1%} | {sum(job.wrong for job in jobs)} "
         f"| {100 * np.median(errors):.1f} ({100 * errors.max():.0f}) "
         f"| {max(job.error_m / job.sigma_m for job in taken):.1f} "
-        f"| {100 * np.sqrt(np.mean(refined**2)):.1f} | {np.sqrt(np.mean(ratios**2)):.2f} "
+        f"| {100 * rms(refined):.1f} | {rms(ratios):.2f} "
         f"| {told} | {100 * max(before, default=0.0):.0f} |"
     )
 

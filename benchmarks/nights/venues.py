@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from benchmarks.printing import rms, table_head
 from benchmarks.scenes import LAYOUTS, Scene, as_built, placed_cameras
 from benchmarks.truth import apart, errors
 from demo.render import outdated
@@ -37,11 +38,10 @@ class Night:
 
 def table(executor: Executor, number: int) -> Iterator[str]:
     """A row for each layout after some of the nights; `number` venues of each layout."""
-    yield (
-        "| venue | night | accepted | error, cm, rms | over sigma, rms | refined, cm, rms | over sigma, rms "
-        "| stitch, px, mean (most) |"
+    yield table_head(
+        "venue | night | accepted | error, cm, rms | over sigma, rms | refined, cm, rms | over sigma, rms "
+        "| stitch, px, mean (most)"
     )
-    yield "|---|---|---|---|---|---|---|---|"
     layouts, numbers = zip(*((layout, n) for layout in VENUES for n in range(number)), strict=True)
     done = list(zip(layouts, executor.map(_nights, layouts, numbers), strict=True))
     for layout in VENUES:
@@ -54,20 +54,16 @@ def table(executor: Executor, number: int) -> Iterator[str]:
 def _row(name: str, number: int, nights: Sequence[Night]) -> str:
     cameras = sum(len(night.error_m) for night in nights)
     figures = (
-        _rms([100 * error for night in nights for error in night.error_m]),
-        _rms([ratio for night in nights for ratio in night.answer_over_sigma]),
-        _rms([100 * error for night in nights for error in night.refined_m]),
-        _rms([ratio for night in nights for ratio in night.over_sigma]),
+        rms([100 * error for night in nights for error in night.error_m]),
+        rms([ratio for night in nights for ratio in night.answer_over_sigma]),
+        rms([100 * error for night in nights for error in night.refined_m]),
+        rms([ratio for night in nights for ratio in night.over_sigma]),
     )
     stitch = [night.stitch_px for night in nights]
     return (
         f"| {name} | {number} | {sum(night.accepted for night in nights)} of {cameras} "
         f"| {' | '.join(f'{figure:.2f}' for figure in figures)} | {np.mean(stitch):.3f} ({max(stitch):.2f}) |"
     )
-
-
-def _rms(values: Sequence[float]) -> float:
-    return float(np.sqrt(np.mean(np.square(values))))
 
 
 def _nights(layout: str, number: int) -> list[Night]:

@@ -18,6 +18,7 @@ import numpy as np
 from benchmarks.lenses import SIGMAS
 from benchmarks.nights.changes import HEAT
 from benchmarks.nights.single import LEAST_WRONG_M
+from benchmarks.printing import table_head
 from benchmarks.scenes import FOCAL_ERROR
 from demo.render import outdated
 from service.schemas.health import Alarms as Rules
@@ -262,8 +263,9 @@ class Night:
 
 def table(_executor: Executor, _number: int) -> Iterator[str]:
     """A row for each day on which something was new, then how long each change took to be named."""
-    yield "| day | what happened | verdict | what the service said | error (sigma), cm, and px of each accepted pose |"
-    yield "|---|---|---|---|---|"
+    yield table_head(
+        "day | what happened | verdict | what the service said | error (sigma), cm, and px of each accepted pose"
+    )
     nights: list[Night] = []
     with tempfile.TemporaryDirectory() as folder, fast_motion() as clock:
         year = Year(Stock(Path(folder)), clock, RULES, SIGMA)
@@ -350,8 +352,7 @@ def _counts(nights: Sequence[Night]) -> Iterator[str]:
     wrong = [answer for answer in answers if answer.is_wrong]
     yield f"{len(nights)} nights, {len(answers)} of {2 * len(nights)} poses accepted, {len(wrong)} of them wrong."
     yield ""
-    yield "| what happened | day | first named on day | days | error before, cm, most | by |"
-    yield "|---|---|---|---|---|---|"
+    yield table_head("what happened | day | first named on day | days | error before, cm, most | by")
     yield from (_named(change, nights) for change in CHANGES if change.names)
 
 

@@ -16,8 +16,9 @@ from pathlib import Path
 import numpy as np
 import sqlalchemy as sa
 
+from benchmarks.processes import resident_mb
 from benchmarks.service.load import ENGINE
-from benchmarks.service.stage import resident_mb, service
+from benchmarks.service.stage import service
 from service.settings import MODEL_BESIDE_THE_CODE
 from service.store import tables
 from testbed import rendered_pair

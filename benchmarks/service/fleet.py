@@ -20,7 +20,8 @@ from pathlib import Path
 import numpy as np
 import sqlalchemy as sa
 
-from benchmarks.service.stage import homes, resident_mb
+from benchmarks.processes import resident_mb
+from benchmarks.service.stage import homes
 from service.application_state import ApplicationState
 from service.intake.submit import frame_paths
 from service.observability import logs

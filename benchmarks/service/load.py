@@ -19,8 +19,10 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.printing import spread
+from benchmarks.processes import core_s
 from benchmarks.service.poller import POLLERS
-from benchmarks.service.stage import service, spread
+from benchmarks.service.stage import service
 from service.client import Client
 from service.schemas.venue import VenueIn
 from service.settings import MODEL_BESIDE_THE_CODE
@@ -31,7 +33,6 @@ DEMO = Path(__file__).parents[2] / "demo"
 ENGINE = [sys.executable, "-P", "-m", "worker.jobs.program"]
 PER_S = 510
 POLLERS_CORE = max(os.sched_getaffinity(0))
-TICKS_PER_S = os.sysconf("SC_CLK_TCK")
 
 
 @dataclass(frozen=True)
@@ -100,12 +101,12 @@ def _seconds(job: dict) -> float:
 def _asking(running: Service, job: str) -> Iterator[Callable[[], Polled]]:
     """The pollers, for as long as the block runs; afterwards the call gives what they heard."""
     command = [sys.executable, "-m", "benchmarks.service.poller", running.url, job, str(PER_S)]
-    api_before = _cpu_seconds(running.process.pid)
+    api_before = core_s(running.process.pid)
     clients = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
     os.sched_setaffinity(clients.pid, {POLLERS_CORE})
 
     def heard() -> Polled:
-        api_s = _cpu_seconds(running.process.pid) - api_before
+        api_s = core_s(running.process.pid) - api_before
         told = json.loads(clients.communicate()[0])
         statuses, seconds = np.array(told["answers"]).T
         assert set(statuses) <= {200, 304}, set(statuses)
@@ -122,9 +123,3 @@ def _asking(running: Service, job: str) -> Iterator[Callable[[], Polled]]:
 
 def _percentile(milliseconds: np.ndarray, percent: float) -> float:
     return float(np.percentile(milliseconds, percent))
-
-
-def _cpu_seconds(process: int) -> float:
-    """User and system time of all threads."""
-    fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) / TICKS_PER_S

@@ -7,8 +7,6 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-import numpy as np
-
 from testbed.homes import HASTY, Embedded, Home, Servers, environment, postgres_binaries, postgres_server, s3_server
 from testbed.running import Service
 
@@ -38,16 +36,3 @@ def service(home: Home, *arguments: str, **settings: str) -> Iterator[Service]:
             yield running
         finally:
             running.kill()
-
-
-def resident_mb(process: int) -> float:
-    """The memory of a process."""
-    status = Path(f"/proc/{process}/status").read_text()
-    return int(status.partition("VmRSS:")[2].split()[0]) / 1000
-
-
-def spread(seconds: Sequence[float], digits: int = 1) -> str:
-    """Median, and the least and the most."""
-    if not len(seconds):
-        return "none"
-    return f"{np.median(seconds):.{digits}f} ({min(seconds):.{digits}f} to {max(seconds):.{digits}f})"
