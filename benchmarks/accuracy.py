@@ -125,7 +125,7 @@ def _rows(venue: str, method: str, seeds: int) -> Iterator[dict]:
     """One row per seed: errors and seconds of a method from a start of the paper's size."""
     for seed in range(seeds):
         key = {"venue": venue, "light": VENUES[venue][2], "method": method, "seed": seed}
-        yield _remembered(key, lambda seed=seed: _judge(venue, METHODS[method], seed))
+        yield _remembered(key, _judge, venue, METHODS[method], seed)
 
 
 def _judge(venue: str, method: Callable, seed: int) -> dict:
@@ -140,9 +140,7 @@ def capture(options: argparse.Namespace) -> Iterator[str]:
     yield table_head("start | caught | missed and accepted | missed and rejected")
     for size in (1.0, 2.0):
         rows = [
-            _remembered(
-                {"venue": venue, "start": number, "size": size}, lambda v=venue, n=number, s=size: _caught(v, n, s)
-            )
+            _remembered({"venue": venue, "start": number, "size": size}, _caught, venue, number, size)
             for number in range(options.starts)
             for venue in [options.venues[number % len(options.venues)]]
         ]
@@ -176,9 +174,7 @@ def presets(options: argparse.Namespace) -> Iterator[str]:
     yield "|---|---|---|---|---|"
     for method in (*SLOW, CLICKED):
         rows = [
-            _remembered(
-                {"venue": venue, "start": number, "preset": method}, lambda v=venue, n=number, m=method: _left(v, n, m)
-            )
+            _remembered({"venue": venue, "start": number, "preset": method}, _left, venue, number, method)
             for number in range(options.slow_starts)
             for venue in [SLOW_VENUES[number % len(SLOW_VENUES)]]
         ]
@@ -204,10 +200,7 @@ def tradeoff(options: argparse.Namespace) -> Iterator[str]:
     rows = {}
     for weight in WEIGHTS:
         rows[weight] = [
-            _remembered(
-                {"venue": venue, "weight": weight},
-                lambda v=venue, w=weight: _judge(v, engine(stitch_weight=w), 0),
-            )
+            _remembered({"venue": venue, "weight": weight}, _judge, venue, engine(stitch_weight=weight), 0)
             for venue in venues
         ]
         yield f"| {weight} | {_cells(rows[weight])} |"
@@ -254,9 +247,9 @@ def _reference(venue: str) -> list[Camera]:
     return engine()(seen, seen.scene.cameras, 10_000).cameras
 
 
-def _remembered(key: dict, run: Callable[[], dict]) -> dict:
+def _remembered(key: dict, run: Callable[..., dict], *arguments: object) -> dict:
     """The row of a key, from the file or run now and appended to it."""
-    return _rows_of_file().remembered(key, lambda: {k: key[k] for k in ("venue", "method") if k in key} | run())
+    return {k: key[k] for k in ("venue", "method") if k in key} | _rows_of_file().remembered(key, run, *arguments)
 
 
 @cache

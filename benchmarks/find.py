@@ -88,8 +88,7 @@ def _rendered(options: argparse.Namespace, engine: Engine) -> Iterator[str]:
     found = {
         (name, knowing): [
             engine.rows.remembered(
-                {"find": name, "n": number, "knowing": knowing},
-                lambda name=name, number=number, knowing=knowing: _found_in_shot(name, number, knowing, engine),
+                {"find": name, "n": number, "knowing": knowing}, _found_in_shot, name, number, knowing, engine
             )
             for number in range(options.views)
         ]
@@ -111,10 +110,7 @@ def _real(options: argparse.Namespace, engine: Engine) -> Iterator[str]:
     found: dict[tuple[str, str], list[dict]] = {}
     for knowing in options.knowing:
         for case in cases(options.folder, options.cases):
-            row = engine.rows.remembered(
-                {"find": case.name, "knowing": knowing},
-                lambda case=case, knowing=knowing: _found_in_case(case, knowing, engine),
-            )
+            row = engine.rows.remembered({"find": case.name, "knowing": knowing}, _found_in_case, case, knowing, engine)
             found.setdefault((case.source, knowing), []).append(row)
     yield from _table(found, options.knowing)
 
@@ -126,10 +122,7 @@ def _beside(options: argparse.Namespace, engine: Engine) -> Iterator[str]:
     everything = list[dict]()
     for name in (name for name in options.fields if grass in GROUNDS[name]):
         rows = [
-            engine.rows.remembered(
-                {"beside": name, "n": number},
-                lambda name=name, number=number: _found_beside(name, number, engine),
-            )
+            engine.rows.remembered({"beside": name, "n": number}, _found_beside, name, number, engine)
             for number in range(options.pairs)
         ]
         everything += rows

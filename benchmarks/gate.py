@@ -130,7 +130,7 @@ SECTIONS = {"good": good, "spoiled": spoiled}
 def _verdicts(rig: str, light: str, kind: str, start: str, number: int) -> list[Verdict]:
     """The verdicts of a run, from the file or run now and appended to it."""
     key = {"rig": rig, "light": light, "kind": kind, "start": start, "number": number}
-    row = _rows().remembered(key, lambda: _run(rig, light, kind, start, number))
+    row = _rows().remembered(key, _run, rig, light, kind, start, number)
     return [Verdict(**verdict) for verdict in row["cameras"]]
 
 

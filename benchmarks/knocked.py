@@ -82,8 +82,7 @@ def main() -> None:
 def _rendered(options: argparse.Namespace, engine: Engine) -> Iterator[str]:
     rows = [
         engine.rows.remembered(
-            {"knocked": name, "n": number, "model": engine.name},
-            lambda name=name, number=number: _rendered_row(name, number, engine),
+            {"knocked": name, "n": number, "model": engine.name}, _rendered_row, name, number, engine
         )
         for name in options.fields
         for number in range(options.draws)
@@ -100,8 +99,7 @@ def _real(options: argparse.Namespace, engine: Engine) -> Iterator[str]:
     for turn in options.turns:
         table[f"real, turned by {turn:g}° about any axis"] = [
             engine.rows.remembered(
-                {"turned": case.name, "deg": turn, "model": engine.name},
-                lambda case=case, turn=turn: _real_row(case, _turned(case, turn), 0, engine),
+                {"turned": case.name, "deg": turn, "model": engine.name}, _turned_row, case, turn, engine
             )
             for case in chosen
         ]
@@ -124,8 +122,7 @@ def _called(options: argparse.Namespace, engine: Engine) -> Iterator[str]:
     for name in TURNED_VENUES:
         rows = [
             engine.rows.remembered(
-                {"turned in": name, "n": number, "model": engine.name},
-                lambda name=name, number=number: _called_row(name, number, engine),
+                {"turned in": name, "n": number, "model": engine.name}, _called_row, name, number, engine
             )
             for number in range(options.draws)
         ]
@@ -144,9 +141,7 @@ def _called(options: argparse.Namespace, engine: Engine) -> Iterator[str]:
 def _exchanged(options: argparse.Namespace, engine: Engine) -> Iterator[str]:
     yield table_head("cameras exchanged | said so | taken for knocked | accepted | core-s")
     for name in VENUES:
-        row = engine.rows.remembered(
-            {"exchanged": name, "model": engine.name}, lambda name=name: _exchanged_row(name, engine)
-        )
+        row = engine.rows.remembered({"exchanged": name, "model": engine.name}, _exchanged_row, name, engine)
         said, knocked, accepted = (sum(row[key]) for key in ("said", "knocked", "accepted"))
         yield f"| {len(row['said'])} | {said} | {knocked} | {accepted} | {row['core_seconds']:.1f} |"
 
@@ -244,9 +239,9 @@ def _exchanged_row(name: str, engine: Engine) -> dict:
     }
 
 
-def _turned(case: Case, degrees: float) -> Camera:
-    (camera,) = started([case.camera], case.name, 0, degrees, 0.0)
-    return camera
+def _turned_row(case: Case, degrees: float, engine: Engine) -> dict:
+    (stored,) = started([case.camera], case.name, 0, degrees, 0.0)
+    return _real_row(case, stored, 0, engine)
 
 
 def _before_a_knock(pitch: Field, camera: Camera, rng: np.random.Generator) -> Camera:

@@ -4,24 +4,22 @@ The demo's left camera on a mast in wind (`benchmarks.shaking`), which the sun t
 length is 0.1 % longer in the afternoon than at night, and dusk leaves a third of the light. Every ten minutes of the
 day two seconds are filmed, five pictures a second; the time between passes without pictures, as far as tracking knows.
 A job every two hours has the real engine calibrate the camera by the newest picture; where it is accepted, tracking
-begins anew from there, as `esc live` does. Beside it the same without jobs, and without forgetting what the pieces of
-line taught.
+begins anew from there, as `esc live` does.
 """
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from contextlib import nullcontext
 from dataclasses import dataclass, field
 from math import cos, pi, sin
-from unittest.mock import patch
 
 import cv2
 import numpy as np
 
 from benchmarks.fields.engine import THREADS
 from benchmarks.live_faults import panned, zoomed
+from benchmarks.printing import table_head
 from benchmarks.shaking import Clip, resized, stored_camera
 from demo.render import FIELD, cameras
 from models import MODEL_PATH
@@ -31,7 +29,6 @@ from worker.calibration.detection.segmentation import Segmenter
 from worker.calibration.geometry.camera import Camera, Frame
 from worker.calibration.geometry.rotation import rotation_angles_deg
 from worker.calibration.records import CalibrationError, Options
-from worker.calibration.tracking import learned_offsets
 from worker.calibration.tracking.follower import CameraTracker, TrackedPose
 
 SIZE, HOURS, BURST_EVERY_S, BURST, RATE = "1080p", 24, 600.0, 10, 5.0
@@ -45,20 +42,16 @@ ROW_H = 3
 
 @dataclass
 class Follower:
-    """One way to track the camera through the day, from where it is `stored`."""
+    """The camera while it is tracked through the day, from where it is `stored`."""
 
-    name: str
     stored: Camera
-    has_jobs: bool
-    forgets: bool
     tracker: CameraTracker | None = None
     jobs: Counter[str] = field(default_factory=Counter)
     found: list[tuple[float, TrackedPose, float]] = field(default_factory=list)
 
     def see(self, frame: Frame, seconds: float, hour: float, true: Camera) -> None:
         """Take the next picture; the camera is looked for where it is stored if it is not tracked."""
-        with nullcontext() if self.forgets else patch.object(learned_offsets, "FORGOTTEN_IN_S", np.inf):
-            tracked = self._tracked(frame, seconds)
+        tracked = self._tracked(frame, seconds)
         if tracked is not None:
             off_deg = rotation_angles_deg(tracked.camera.pose.rotation, true.pose.rotation)
             self.found.append((hour, tracked, off_deg))
@@ -113,25 +106,18 @@ def main() -> None:
     """Film the day, track it, print the table."""
     cv2.setNumThreads(THREADS)
     taken_by, picture = resized(cameras()[0], SIZE)
-    stored = stored_camera(taken_by, 0, "exact")
-    ways = [
-        Follower("as it is", stored, has_jobs=True, forgets=True),
-        Follower("no jobs", stored, has_jobs=False, forgets=True),
-        Follower("no jobs, nothing forgotten", stored, has_jobs=False, forgets=False),
-    ]
+    follower = Follower(stored_camera(taken_by, 0, "exact"))
     segment = Segmenter(MODEL_PATH, THREADS)
     for number, (hour, shots) in enumerate(bursts(taken_by, picture)):
-        for way in ways:
-            if way.has_jobs and number % JOB_EVERY == JOB_EVERY - 1:
-                way.calibrated(shots[0][0], segment)
-            for shot, (frame, true) in enumerate(shots):
-                way.see(frame, 0.0 if shot else BURST_EVERY_S - BURST / RATE, hour, true)
-    print("Each: measured, coasted, refused; while measured turn off, rms, and in its sigma, rms and at most.\n")
-    print(f"| hours | {' | '.join(way.name for way in ways)} |")
-    print("|---" * (1 + len(ways)) + "|")
+        if number % JOB_EVERY == JOB_EVERY - 1:
+            follower.calibrated(shots[0][0], segment)
+        for shot, (frame, true) in enumerate(shots):
+            follower.see(frame, 0.0 if shot else BURST_EVERY_S - BURST / RATE, hour, true)
+    print("Turn off while measured: rms, and in its sigma, rms and at most.\n")
+    print(table_head("hours | measured, coasted, refused; turn off, and in its sigma"))
     for begin_h in range(0, HOURS, ROW_H):
-        print(f"| {begin_h} to {begin_h + ROW_H} | {' | '.join(row(way, begin_h) for way in ways)} |")
-    print(f"\nJobs: {dict(ways[0].jobs)}")
+        print(f"| {begin_h} to {begin_h + ROW_H} | {row(follower, begin_h)} |")
+    print(f"\nJobs: {dict(follower.jobs)}")
 
 
 if __name__ == "__main__":

@@ -16,12 +16,12 @@ class Rows:
         written = path.read_text().splitlines() if path.exists() else []
         self.known = {_name(row["key"]): row for row in map(json.loads, written)}
 
-    def remembered(self, key: dict, run: Callable[[], dict]) -> dict:
-        """The row of a key, from the file or run now and appended to it."""
+    def remembered(self, key: dict, run: Callable[..., dict], *arguments: object) -> dict:
+        """Return the row of a key, from the file or run now with the arguments and appended to it."""
         name = _name(key)
         if name not in self.known:
             begin = time.perf_counter()
-            row = {"key": key, **run()}
+            row = {"key": key, **run(*arguments)}
             self.path.parent.mkdir(parents=True, exist_ok=True)
             with self.path.open("a") as file:
                 file.write(json.dumps(row) + "\n")

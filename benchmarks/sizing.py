@@ -20,6 +20,7 @@ import httpx
 import obstore
 from obstore.store import from_url
 
+from benchmarks.processes import core_s
 from service.settings import Settings
 from testbed.running import children, ready, wait_for
 
@@ -259,8 +260,7 @@ def _real_job(http: httpx.Client, worker: int) -> tuple[float, float]:
 
 def _of_children(process: int) -> float:
     """Seconds of processor time of the children that a process has waited for; proc(5)."""
-    fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
-    return sum(int(value) for value in fields[13:15]) / os.sysconf("SC_CLK_TCK")
+    return core_s(process, children=True) - core_s(process)
 
 
 def _n(value: float) -> str:

@@ -6,6 +6,8 @@ import cv2
 import numpy as np
 
 from models.training.pitches.render import Conditions, render_frame
+from testbed.synthetic import moved
+from testbed.venue_documents import venue_document
 from worker.calibration.geometry.camera import Camera, Pose
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.lens import Intrinsics
@@ -37,23 +39,5 @@ def encoded(frame: np.ndarray) -> bytes:
 
 
 def venue(name: str, right_turn=TURNED) -> dict:
-    return {
-        "id": name,
-        "name": "Rendered pitch",
-        "field": {"length_m": 105, "width_m": 68, "line_width_m": 0.12, "ridge": PITCH.ridge.tolist()},
-        "cameras": [
-            {
-                "id": c.id,
-                "image_size": list(SIZE),
-                "intrinsics": {
-                    "matrix": c.intrinsics.matrix.tolist(),
-                    "distortion": c.intrinsics.distortion.tolist(),
-                },
-                "pose": {
-                    "rotation": (c.pose.rotation + (TURNED if c.id == "left" else right_turn)).tolist(),
-                    "position": (c.pose.position + MOVED_M).tolist(),
-                },
-            }
-            for c in cameras()
-        ],
-    }
+    stored = [moved(camera, turn, MOVED_M) for camera, turn in zip(cameras(), (TURNED, right_turn), strict=True)]
+    return venue_document(name, PITCH, stored)

@@ -12,6 +12,7 @@ import numpy as np
 from benchmarks.scenes import SIZE, START_DEG, START_M, rendered
 from demo.render import outdated
 from models.training.pitches.conditions import Conditions
+from testbed.venue_documents import pose_document, venue_document
 from worker.calibration.geometry.camera import Camera, Pose
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.lens import Intrinsics
@@ -44,7 +45,7 @@ def _demo(start: str) -> Case:
     venue, truth = (json.loads((DEMO / name).read_text()) for name in ("venue.json", "truth.json"))
     name = f"demo-{start}"
     for number, camera in enumerate(venue["cameras"]):
-        camera["pose"] = _stored(_pose(truth["poses"][camera["id"]]), start, number)
+        camera["pose"] = pose_document(_stored(_pose(truth["poses"][camera["id"]]), start, number))
     files = {camera["id"]: (DEMO / f"{camera['id']}.jpg").read_bytes() for camera in venue["cameras"]}
     return Case(name, venue | {"id": name}, files)
 
@@ -57,20 +58,8 @@ def _around(count: int, start: str) -> Case:
     for camera in cameras:
         frame = rendered(f"cost-{camera.id}", PITCH, camera, conditions)
         files[camera.id] = cv2.imencode(".jpg", frame, [cv2.IMWRITE_JPEG_QUALITY, 88])[1].tobytes()
-    entries = [
-        {
-            "id": camera.id,
-            "image_size": list(SIZE),
-            "intrinsics": {
-                "matrix": camera.intrinsics.matrix.tolist(),
-                "distortion": camera.intrinsics.distortion.tolist(),
-            },
-            "pose": _stored(camera.pose, start, number),
-        }
-        for number, camera in enumerate(cameras)
-    ]
-    field = {"length_m": PITCH.length, "width_m": PITCH.width, "line_width_m": 0.12, "ridge": PITCH.ridge.tolist()}
-    return Case(name, {"id": name, "field": field, "cameras": entries}, files)
+    stored = [camera.with_pose(_stored(camera.pose, start, number)) for number, camera in enumerate(cameras)]
+    return Case(name, venue_document(name, PITCH, stored), files)
 
 
 def _camera(x: float, side: int) -> Camera:
@@ -80,9 +69,8 @@ def _camera(x: float, side: int) -> Camera:
     return Camera(f"{'near' if side < 0 else 'far'}-{x + 50:.0f}", lens, pose)
 
 
-def _stored(truth: Pose, start: str, number: int) -> dict:
-    pose = outdated(truth, *STARTS[start], np.random.default_rng([SEED, number]))
-    return {"rotation": pose.rotation.tolist(), "position": pose.position.tolist()}
+def _stored(truth: Pose, start: str, number: int) -> Pose:
+    return outdated(truth, *STARTS[start], np.random.default_rng([SEED, number]))
 
 
 def _pose(written: dict) -> Pose:

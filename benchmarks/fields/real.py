@@ -35,7 +35,7 @@ def _seeing(chosen: Sequence[Case], engine: Engine) -> Iterator[str]:
     sources: dict[str, list[dict]] = defaultdict(list)
     for case in chosen:
         key = {"seen": case.name, "model": engine.name}
-        sources[case.source].append(engine.rows.remembered(key, lambda case=case: seen(case, engine.segment)))
+        sources[case.source].append(engine.rows.remembered(key, seen, case, engine.segment))
     yield "At the reference pose; means over frames. Seconds and core-seconds per frame: medians."
     yield "Beyond chance: of what the evidence finds, the part that is not found beside the lines as well, 1 - c / f of"
     yield "found f and chance c. Precision: the part that is line if lines which can be seen are found whatever chance"
@@ -90,9 +90,7 @@ def _starts(chosen: Sequence[Case], options: argparse.Namespace, engine: Engine)
     for venue, group in venues.items():
         for number in range(options.starts):
             key = {"start": venue, "n": number, "deg": options.turn, "cm": options.shift, "model": engine.name}
-            row = engine.rows.remembered(
-                key, lambda v=venue, g=group, n=number: _started(v, g, n, options.turn, options.shift / 100, engine)
-            )
+            row = engine.rows.remembered(key, _started, venue, group, number, options.turn, options.shift / 100, engine)
             for case in group:
                 sources[case.source].append({**row, **row["cameras"][case.name], "case": case.name, "n": number})
     yield f"{options.starts} starts of each, {options.turn:g}° and {options.shift:g} cm off."

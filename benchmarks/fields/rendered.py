@@ -70,8 +70,7 @@ def section(options: argparse.Namespace, engine: Engine) -> Iterator[str]:
     rows = {
         name: [
             engine.rows.remembered(
-                {"rendered": name, "n": number, "model": engine.name},
-                lambda name=name, number=number: _judged(name, number, engine, options.pictures),
+                {"rendered": name, "n": number, "model": engine.name}, _judged, name, number, engine, options.pictures
             )
             for number in range(options.views)
         ]

@@ -87,7 +87,7 @@ def _table(kind: str, views: Sequence[View], options: argparse.Namespace, engine
                 "cm": options.shift,
                 "model": engine.name,
             }
-            row = engine.rows.remembered(key, lambda v=view, n=name, o=other: _judged(v, n, o, options, engine))
+            row = engine.rows.remembered(key, _judged, view, name, other, options, engine)
             rows[name].append(row)
     yield f"{kind}; stored poses {options.turn:g}° and {options.shift:g} cm off; near: within 30 cm and 1°."
     yield ""

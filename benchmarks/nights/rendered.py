@@ -27,6 +27,7 @@ from models.training.pitches.conditions import LIGHTS, Conditions
 from service.settings import MODEL_BESIDE_THE_CODE
 from testbed.homes import Embedded
 from testbed.running import Service, wait_for
+from testbed.venue_documents import venue_document
 from worker.calibration.geometry.camera import Camera, Frame, Pose
 from worker.calibration.geometry.parameters import with_focal_length
 
@@ -131,15 +132,17 @@ def _nights(running: Service, view: str, number: int, lens: LensCase) -> Iterato
     rng = np.random.default_rng([23, list(FOCAL_LENGTHS).index(view), number])
     camera = _camera(view, number)
     pictures = [_picture(view, number, light) for light in LIGHTS]
-    pose = _wire_pose(outdated(camera.pose, FOUND_M, FOUND_DEG, rng))
+    pose = outdated(camera.pose, FOUND_M, FOUND_DEG, rng)
     for night in range(lens.nights):
         venue = "venue" if lens.remembers else f"night-{night}"
         if night == 0 or not lens.remembers:
-            running.http.put(f"/venues/{venue}", json=_venue(venue, camera, pose)).raise_for_status()
+            running.http.put(
+                f"/venues/{venue}", json=venue_document(venue, PITCH, [camera.with_pose(pose)])
+            ).raise_for_status()
         real = _tonight(camera, lens.longer(night), rng)
         frame = _seen_through(pictures[night % len(pictures)], camera, real)
         yield real, _calibrated(running, venue, _packed(frame, rng))
-        pose = running.http.get(f"/venues/{venue}").raise_for_status().json()["cameras"][0]["pose"]
+        pose = _pose(running.http.get(f"/venues/{venue}").raise_for_status().json()["cameras"][0])
 
 
 def _camera(view: str, number: int) -> Camera:
@@ -192,28 +195,6 @@ def _calibrated(running: Service, venue: str, frame: bytes) -> dict:
     return ended["result"]
 
 
-def _venue(name: str, camera: Camera, pose: dict) -> dict:
-    lens = {
-        "matrix": camera.intrinsics.matrix.tolist(),
-        "distortion": camera.intrinsics.distortion.tolist(),
-    }
-    size = list(camera.intrinsics.size)
-    return {
-        "id": name,
-        "field": {
-            "length_m": PITCH.length,
-            "width_m": PITCH.width,
-            "line_width_m": PITCH.line_width,
-            "ridge": PITCH.ridge.tolist(),
-        },
-        "cameras": [{"id": "camera", "image_size": size, "intrinsics": lens, "pose": pose}],
-    }
-
-
-def _wire_pose(pose: Pose) -> dict:
-    return {"rotation": pose.rotation.tolist(), "position": pose.position.tolist()}
-
-
 def _job(result: dict, real: Camera, longer: float) -> RenderedJob:
     """What a result says beside the real camera, whose focal length is `longer` than at first by a part of it."""
     camera = result["cameras"][0]
@@ -232,8 +213,11 @@ def _job(result: dict, real: Camera, longer: float) -> RenderedJob:
 
 
 def _error_m(answer: dict, real: Camera) -> float:
-    pose = Pose(np.array(answer["pose"]["rotation"]), np.array(answer["pose"]["position"]))
-    return apart(real.with_pose(pose), real)[0]
+    return apart(real.with_pose(_pose(answer)), real)[0]
+
+
+def _pose(answer: dict) -> Pose:
+    return Pose(np.array(answer["pose"]["rotation"]), np.array(answer["pose"]["position"]))
 
 
 def _sigma_m(answer: dict) -> float:

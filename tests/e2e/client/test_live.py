@@ -14,8 +14,8 @@ from testbed import warm
 from testbed.program import TURNED
 from testbed.rtsp import encode, filming, has_server
 from testbed.running import venue, wait_for
-from testbed.synthetic import pair, pair_frames
-from tests.e2e.client.test_stitching import document
+from testbed.synthetic import CROWNED, pair, pair_frames
+from testbed.venue_documents import venue_document
 from tests.e2e.commands import esc_here
 from tests.service.live.receiving import freed_packet, listening, opentrackio_sample, port_of
 from tests.worker.video.shaking import film_shaking
@@ -120,7 +120,7 @@ def test_what_is_no_rate_or_address_is_a_usage_error(service, tmp_path, argument
 @pytest.mark.slow
 def test_a_camera_is_tracked_in_its_stream_and_of_the_other_one_the_stored_pose_is_sent(service, name, tmp_path):
     clip = film_shaking(tmp_path)["left"]
-    service.http.put(f"/venues/{name}", json=document(name, pair())).raise_for_status()
+    service.http.put(f"/venues/{name}", json=venue_document(name, CROWNED, pair())).raise_for_status()
     with live(service, name, f"left={clip}", "--json", "--rate", "5") as process:
         lines = (json.loads(line) for line in process.stdout)
         left = next(line for line in lines if line["camera"] == "left" and line["status"] == "measured")
@@ -156,7 +156,7 @@ def filmed(tmp_path_factory):
 @contextmanager
 def recovering(service, name, filmed, behaviour):
     """`esc live --recover` of cameras that have turned, by as much as the stub of the engine turns them if asked to."""
-    stored = document(name, pair()) | {"name": behaviour}
+    stored = venue_document(name, CROWNED, pair()) | {"name": behaviour}
     for camera in stored["cameras"]:
         camera["pose"]["rotation"][0] -= TURNED
     service.http.put(f"/venues/{name}", json=stored).raise_for_status()
