@@ -57,21 +57,21 @@ wheel: setup
 	rm -rf build/lib build/bdist.*
 	$(BIN)/pip wheel --quiet --disable-pip-version-check --no-deps --no-build-isolation --wheel-dir dist . ./client
 
+# One BLAS thread, as the worker sets it.
+BENCH := env OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks
+
 bench-real: setup
 	$(BIN)/python -m benchmarks.real_pair
 	$(BIN)/python -m benchmarks.seam
 
-# One BLAS thread, as the worker sets it.
 bench-fields: setup
-	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks.fields
+	$(BENCH).fields
 
-# One BLAS thread, as the worker sets it.
 bench-find: setup
-	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks.find
+	$(BENCH).find
 
-# One BLAS thread, as the worker sets it.
 bench-knocked: setup
-	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks.knocked
+	$(BENCH).knocked
 
 # Needs GStreamer's RTSP server, as CONTRIBUTING.md says.
 bench-live: setup
@@ -95,19 +95,17 @@ $(VENV)/.bench: $(VENV)/.installed
 	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[bench]'
 	touch $@
 
-# One BLAS thread, as the worker sets it.
 bench: $(VENV)/.bench
-	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks.accuracy
+	$(BENCH).accuracy
 
 # What `make bench` compares with and has to be trained, once: six hours of one core, less with a GPU (see --help).
 bench-learned: $(VENV)/.bench
-	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 nice -n 19 $(BIN)/python -m benchmarks.learned
+	nice -n 19 $(BENCH).learned
 
-# One BLAS thread, as the worker sets it.
 # ONLY: some of its parts, for instance `make bench-truth ONLY=nights`.
 ONLY ?= lenses gate nights twice
 bench-truth: $(VENV)/.bench $(VENV)/.train
-	for part in $(ONLY); do OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks.$$part || exit 1; done
+	for part in $(ONLY); do $(BENCH).$$part || exit 1; done
 
 # BEFORE: a clone of an earlier release with its .venv; `git worktree add ../esc-before v0.1.0 && make -C ../esc-before setup`.
 bench-cost: setup
@@ -119,12 +117,11 @@ bench-versions: setup
 bench-rate: setup
 	$(BIN)/python -m benchmarks.rate
 
-# One BLAS thread, as the worker sets it.
 bench-follow: setup
-	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks.shaking
-	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks.shaking --lens usual
-	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks.shaking --size 4k --seconds 4
-	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks.tracking_cost $(if $(BEFORE),--before $(BEFORE))
+	$(BENCH).shaking
+	$(BENCH).shaking --lens usual
+	$(BENCH).shaking --size 4k --seconds 4
+	$(BENCH).tracking_cost $(if $(BEFORE),--before $(BEFORE))
 
 bench-video: setup
 	$(BIN)/python -m benchmarks.stitch_video
