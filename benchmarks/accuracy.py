@@ -98,7 +98,7 @@ def table(options: argparse.Namespace) -> Iterator[str]:
 
 
 def _seeds(options: argparse.Namespace, venue: str, method: str) -> int:
-    """How often a method runs on a venue: those that take minutes run on a few."""
+    """Return how often a method runs on a venue: those that take minutes run on a few."""
     if method not in SLOW:
         return options.seeds
     return options.slow_seeds if venue in SLOW_VENUES else 0
@@ -136,7 +136,7 @@ def _judge(venue: str, method: Callable, seed: int) -> dict:
 
 
 def capture(options: argparse.Namespace) -> Iterator[str]:
-    """How many starts end where the same frames end when started from the truth."""
+    """Count the starts that end where the same frames end when started from the truth."""
     yield table_head("start | caught | missed and accepted | missed and rejected")
     for size in (1.0, 2.0):
         rows = [
@@ -169,7 +169,7 @@ def _caught(venue: str, number: int, size: float) -> dict:
 
 
 def presets(options: argparse.Namespace) -> Iterator[str]:
-    """How many starts the paper's presets bring near the truth, every camera within `PULLED_IN_DEG`; beside clicks."""
+    """Count the starts from which the paper's presets end within `PULLED_IN_DEG`, beside clicked corners."""
     yield f"| from 2.1° | within {PULLED_IN_DEG}° | worst camera, median cm | ° | largest ° |"
     yield "|---|---|---|---|---|"
     for method in (*SLOW, CLICKED):
@@ -185,7 +185,7 @@ def presets(options: argparse.Namespace) -> Iterator[str]:
 
 
 def _left(venue: str, number: int, method: str) -> dict:
-    """How far off the worst camera is where a method ends."""
+    """Run a method from a start, and return the errors of its worst camera."""
     seen = _seen(venue)
     true = seen.scene.cameras
     found = METHODS[method](seen, started(true, np.random.default_rng([number, 2])), number).cameras

@@ -1,4 +1,4 @@
-"""What each caller sees while something hangs, is away or is full: `make bench-faults`.
+"""Answers that each caller gets while something hangs, is away or is full: `make bench-faults`.
 
 Prints a table: the answers that each kind of caller got, and the longest wait of any of them. Every caller asks again
 and again, on a connection of its own each time. Real processes, PostgreSQL, S3 (moto's server), sockets and, where root
@@ -46,7 +46,7 @@ Fault = Callable[[Service], AbstractContextManager[None]]
 
 @dataclass
 class Seen:
-    """What one kind of caller saw."""
+    """Answers that one kind of caller got, and the longest wait."""
 
     answers: Counter[str] = field(default_factory=Counter)
     longest_s: float = 0.0
@@ -141,7 +141,7 @@ def tell(fault: str, home: str, seen: Mapping[str, Seen]) -> None:
 
 
 def watched(running: Service, fault: Fault, callers: Mapping[str, Call], seconds: float) -> dict[str, Seen]:
-    """What callers see from the beginning of a fault until all who asked during it have an answer."""
+    """Return what callers see from the beginning of a fault until all who asked during it have an answer."""
     running.venue("v", "accept 1")
     seen: dict[str, Seen] = defaultdict(Seen)
     with fault(running), ThreadPoolExecutor(2 * len(callers)) as threads:
@@ -217,7 +217,7 @@ def put_camera(running: Service, name: str, source: str, **more: object) -> None
 
 
 def with_a_clock_that_moves(home: Home, seconds: float) -> dict[str, Seen]:
-    """What callers see of a service whose clock is hours ahead from the beginning, and right again half way."""
+    """Return what callers see of a service whose clock is hours ahead from the beginning, and right again half way."""
     with tempfile.TemporaryDirectory(prefix="esc-bench-") as folder:
         clock = Clock(Path(folder))
 
@@ -255,7 +255,7 @@ def many_uploads(running: Service, peaks: list[float]) -> Iterator[None]:
 
 
 def on_a_full_disk(seconds: float) -> dict[str, Seen]:
-    """Where not a byte can be written, to database, files and log."""
+    """Return what callers see where not a byte can be written, to database, files and log."""
     with tempfile.TemporaryDirectory(prefix="esc-bench-") as name, small_disk(Path(name) / "disk", DISK_MB) as disk:
         running = Service(disk / "esc", ESC_MIN_FREE_MB="0").ready()
         try:

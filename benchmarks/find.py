@@ -217,7 +217,7 @@ def _found_in_case(case: Case, knowing: str, engine: Engine) -> dict:
 
 
 def _found(pitch: Field, truth: Camera, frame: Frame, knowing: str, seed: int, engine: Engine) -> dict:
-    """What is found of a camera, what it costs, and whether its frame is `fit` for any job."""
+    """Search for a camera, and return what was found, its cost, and whether its frame is `fit` for any job."""
     sought = _sought(truth, knowing, np.random.default_rng([seed, 5]))
     cpu = time.process_time()
     found = find_cameras(pitch, [sought], [], {truth.id: [frame]}, engine.segment, seed)
@@ -252,7 +252,7 @@ def _found(pitch: Field, truth: Camera, frame: Frame, knowing: str, seed: int, e
 
 
 def ends_alike(pitch: Field, from_truth: Answer, found: Camera) -> bool:
-    """Whether a camera was found where a job ends that began with the true pose."""
+    """True if a camera was found where a job ends that began with the true pose."""
     if from_truth.said is None:
         return False
     (there,) = from_truth.said.cameras
@@ -260,18 +260,18 @@ def ends_alike(pitch: Field, from_truth: Answer, found: Camera) -> bool:
 
 
 def wrong_ones(rows: Sequence[dict]) -> str:
-    """How many of what was found is not near, and in brackets of these where a job ends that began with the truth."""
+    """Return how many answers are not near, and in brackets how many of these a job from the truth ends at."""
     wrong = [row for row in rows if not row["near"]]
     return f"{len(wrong)} ({sum(row['as_from_truth'] for row in wrong)})"
 
 
 def wrong_in_words(row: dict) -> str:
-    """How a row is told that is found, and not near."""
+    """Return the words for a row that is found, and not near."""
     return "WRONG" + (", as is a job that began with the truth" if row["as_from_truth"] else "")
 
 
 def shows_many_directions(pitch: Field, camera: Camera) -> bool:
-    """Whether a camera sees an arc or a circle, or straight lines of three directions: enough to tell pose and lens."""
+    """True if a camera sees an arc or a circle, or straight lines of three directions: enough to tell pose and lens."""
     lines = pitch.line_points()
     in_view = lines[inside(camera.project(lines.position), camera.intrinsics.size)]
     along_deg = np.degrees(np.arctan2(in_view.tangent[:, 1], in_view.tangent[:, 0])) % 180

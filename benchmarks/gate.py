@@ -46,7 +46,7 @@ TARPAULIN = (90.0, 60.0, 40.0)
 
 @dataclass(frozen=True)
 class Verdict:
-    """What became of one camera: whether its frame was `spoiled`, and how far off it is, m and degrees, with sigma."""
+    """The end of one camera: whether its frame was `spoiled`, and its errors, m and degrees, with sigma."""
 
     camera: str
     spoiled: bool
@@ -58,7 +58,7 @@ class Verdict:
 
     @property
     def right(self) -> bool:
-        """Whether its pose is where it says."""
+        """True if the pose is within three sigma and 30 cm of the truth."""
         within = self.error_m <= SIGMAS * self.sigma_m and self.error_deg <= SIGMAS * self.sigma_deg
         return within and self.error_m <= FARTHEST_M
 
@@ -171,7 +171,7 @@ def _taken(rig: str, light: str, kind: str, real: Sequence[Camera]) -> Taken:
 
 
 def _frame(rig: str, light: str, camera: Camera, pitch: Field = PITCH, of: str = "") -> Frame:
-    """What a camera sees of a pitch; `of`: what is unlike the venue, for the name of the file."""
+    """Render the frame of a camera; `of`: what is unlike the venue, for the name of the file."""
     drawn = Conditions.named(light, np.random.default_rng([12, list(RIGS).index(rig), HOURS.index(light)]))
     conditions = seen_well(drawn, fringe=0.3, swell=1.0, wobble=1.0)
     return rendered("-".join(["gate", rig, light, camera.id, *of.split()]).replace(" ", "-"), pitch, camera, conditions)

@@ -131,7 +131,7 @@ def _answer(ask: Callable[[], httpx.Response]) -> str:
 
 
 def _raw(make: Callable[[Draw], Iterator[bytes]]) -> Callable[[Service, str, Draw], str]:
-    """What `make` draws, after the head of a request, byte for byte; then the client waits for its answer."""
+    """Send what `make` draws, after the head of a request, byte for byte; then wait for the answer."""
 
     def send(service: Service, path: str, draw: Draw) -> str:
         with closing(_connection(service, path)) as connection:

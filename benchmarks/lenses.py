@@ -59,7 +59,7 @@ class Row:
 
     @property
     def wrong(self) -> bool:
-        """Whether a pose was accepted that is farther off than it says, or than anything may be."""
+        """True if a pose was accepted that is farther off than three of its sigmas, or than 30 cm."""
         return self.accepted and (self.error_m > SIGMAS * self.sigma_m or self.error_m > FARTHEST_M)
 
 
@@ -182,7 +182,7 @@ def camera_of_view(focal: float, view: str, rng: np.random.Generator) -> Camera:
 
 
 def lens_given_wrong(real: Lens, wrong: dict[str, float]) -> Lens:
-    """What a venue says of a lens that is really longer, and so on, by the numbers of `wrong`."""
+    """Return the lens that a venue states if the real one is longer, and so on, by the numbers of `wrong`."""
     matrix, distortion = real.matrix.copy(), real.distortion.copy()
     matrix[[0, 1], [0, 1]] /= 1 + wrong.get("focal", 0.0)
     matrix[1, 1] /= 1 + wrong.get("aspect", 0.0)

@@ -82,7 +82,7 @@ class Follower:
 
 
 def bursts(taken_by: Camera, picture: Frame) -> Iterator[tuple[float, list[tuple[Frame, Camera]]]]:
-    """What is filmed at each hour of the day, and where the camera was at each picture."""
+    """Yield the pictures of each hour of the day, with the true camera of each."""
     for number in range(round(HOURS * 3600 / BURST_EVERY_S)):
         hour = number * BURST_EVERY_S / 3600
         warmth = cos(2 * pi * (hour - WARMEST_H) / 24)
@@ -93,7 +93,7 @@ def bursts(taken_by: Camera, picture: Frame) -> Iterator[tuple[float, list[tuple
 
 
 def row(follower: Follower, begin_h: float) -> str:
-    """Of a few hours."""
+    """Return the cells of a few hours."""
     own = [one for one in follower.found if begin_h <= one[0] < begin_h + ROW_H]
     how = Counter(tracked.how for _, tracked, _ in own)
     errors = np.array([[off, off / tracked.sigma.rotation_deg] for _, tracked, off in own if tracked.how == "measured"])

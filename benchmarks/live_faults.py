@@ -1,4 +1,4 @@
-"""What happens to cameras that `esc live` tracks, as scenes: what it sends and says before, meanwhile and afterwards.
+"""Faults of cameras that `esc live` tracks, as scenes: what it sends and says before, meanwhile and afterwards.
 
 Each fault happens to the first camera alone; the other one films on. A camera that is zoomed or knocked films what it
 then sees, with the demo's picture mirrored where it ends.
@@ -53,7 +53,7 @@ class Scene:
 
 
 def changed_clips(film: Film) -> dict[str, tuple[Path, Clip]]:
-    """What the first camera films once it was zoomed, nudged or knocked, by these words."""
+    """Return the clips of the first camera once it was zoomed, nudged or knocked, by these words."""
     taken_by, picture = resized(cameras()[0], film.size)
     made = {
         "zoomed": zoomed(taken_by, ZOOM),
@@ -82,7 +82,7 @@ def panned(camera: Camera, degrees: float) -> Camera:
 
 
 def faults(first: Path, changed: dict[str, Path]) -> list[Fault]:
-    """What happens, one after the other, to the camera that films the clip `first` otherwise."""
+    """List the faults, one after the other, of the camera that films the clip `first` otherwise."""
     back = ("clip", first)
     return [
         Fault("no pictures for 4 s", ("pull",), 4),
@@ -141,7 +141,7 @@ def run_soak(film: Film, every: int, minutes: float) -> None:
 
 @dataclass(frozen=True)
 class Phase:
-    """What happened to a camera in a time, Unix time in ns; `mended_ns`: when that was over, if it was a fault."""
+    """A time in which one thing happened to a camera, Unix time in ns; `mended_ns`: the end of a fault."""
 
     what: str
     camera: str
@@ -196,7 +196,7 @@ def soak_table(run: LiveRun, phases: Sequence[Phase]) -> list[str]:
 
 @contextmanager
 def filmed(film: Film, every: int, *options: str, url: str | None = None) -> Iterator[tuple[LiveRun, list[Fault]]]:
-    """Both cameras while they are tracked, with these options and by a service at `url`, and what may happen."""
+    """Track both cameras, with these options and by a service at `url`; yields the run and its faults."""
     _, made = clips(film.size)
     changed = changed_clips(film)
     paths = {word: path for word, (path, _) in changed.items()}
@@ -229,7 +229,7 @@ def play(run: LiveRun, fault: Fault) -> Scene:
 
 
 def measured_again_ns(run: LiveRun, since_ns: int) -> int | None:
-    """When the first camera was first measured after a time."""
+    """Return when the first camera was first measured after a time."""
     own = (sent.at_ns for sent in list(run.sent) if sent.camera == run.names[0] and sent.status == "measured")
     return next((at_ns for at_ns in own if at_ns >= since_ns), None)
 
@@ -271,7 +271,7 @@ def table(run: LiveRun, scenes: Sequence[Scene]) -> list[str]:
 
 
 def statuses(run: LiveRun, camera: str, begin_ns: int, end_ns: int) -> str:
-    """How many poses of each status were sent in a time."""
+    """Count the poses of each status that were sent in a time."""
     how = Counter(sent.status for sent in run.of(camera, begin_ns, end_ns))
     return ", ".join(str(how[status]) for status in ("measured", "coasted", "refused", "stored"))
 

@@ -38,31 +38,31 @@ Truth = Callable[[int], Camera]
 
 @dataclass(frozen=True)
 class Film:
-    """How cameras film: pictures of a `size`, so many a second, of which the clips have whole multiples."""
+    """Format of the cameras: pictures of a `size`, so many a second, of which the clips have whole multiples."""
 
     size: str
     rate: float
 
     @property
     def every(self) -> int:
-        """One of so many pictures of a clip is filmed."""
+        """Step between the pictures of a clip that are filmed."""
         return round(FRAMES_PER_SECOND / self.rate)
 
     @property
     def bits(self) -> int:
-        """Of a second: as many for each picture, whatever the rate."""
+        """Bits of a second: as many for each picture, whatever the rate."""
         return round(SIZES[self.size][2] / self.every)
 
     def file(self, name: str) -> Path:
-        """Where what a camera films is kept, by a name of it."""
+        """Return the file of what a camera films, by a name of it."""
         return FOLDER / f"{name}-{self.size}-{self.rate:g}"
 
     def pictures(self, clip: Clip) -> Iterator[NDArray[np.uint8]]:
-        """What a camera films of a clip, again and again."""
+        """Return the pictures that a camera films of a clip, again and again."""
         return (clip.frame(number) for number in range(0, PERIOD, self.every))
 
     def truth(self, clip: Clip) -> Truth:
-        """Where a camera is at each picture that it films of a clip."""
+        """Return the true camera by the number of a picture of a clip."""
         return lambda picture: clip.camera(self.every * picture)
 
 
@@ -75,17 +75,17 @@ class SentPose:
 
     @property
     def camera(self) -> str:
-        """Of which it is."""
+        """Id of the camera."""
         return str(self.line["camera"])
 
     @property
     def status(self) -> str:
-        """How the pose is known."""
+        """Status of the pose: measured, coasted, refused or stored."""
         return str(self.line["status"])
 
     @property
     def time_ns(self) -> float:
-        """When the picture was taken, as it says."""
+        """Time at which the picture was taken, by the line."""
         return datetime.fromisoformat(self.line["time"]).timestamp() * 1e9
 
 

@@ -1,4 +1,4 @@
-"""Everything that is compared: each takes a scene and outdated cameras, and answers where it thinks they are."""
+"""Methods that are compared: each takes a scene and outdated cameras, and answers with poses."""
 
 from __future__ import annotations
 
@@ -45,11 +45,11 @@ class Seen:
         }
 
     def response(self, camera: Camera) -> np.ndarray:
-        """What the network said of a camera's frame, (H, W) in 0..1."""
+        """Return the network's response to a camera's frame, (H, W) in 0..1."""
         return self.responses[id(self.scene.frames[camera.id][0])].astype(np.float32) / 255
 
     def segment(self, frame: Frame, regions: Sequence[Region]) -> np.ndarray:
-        """What the network said, where it would have been asked; of an overview it is asked now."""
+        """Return the network's response in the regions; an overview is segmented now."""
         if id(frame) not in self.responses:
             return self.segmenter(frame, regions)
         response = np.zeros_like(self.responses[id(frame)])
@@ -80,7 +80,7 @@ class Answer:
 
     @property
     def has_poses(self) -> bool:
-        """Whether there is more to judge than a seam."""
+        """True if the method answers with poses, not with a seam alone."""
         return bool(self.cameras)
 
 
@@ -88,7 +88,7 @@ Method = Callable[[Seen, list[Camera], int], Answer]
 
 
 def start(_seen: Seen, cameras: list[Camera], _seed: int) -> Answer:
-    """Nothing at all: the outdated poses."""
+    """Answer with the outdated poses."""
     return Answer(cameras, 0.0, 0.0)
 
 
@@ -126,7 +126,7 @@ def homography(seen: Seen, _cameras: list[Camera], _seed: int) -> Answer:
 
 
 def _features(seen: Seen, number: int) -> tuple[np.ndarray, np.ndarray]:
-    """Where the undistorted picture of a camera has features (F, 2), and what they look like."""
+    """Return the SIFT features (F, 2) of the undistorted picture of a camera, and their descriptors."""
     camera = seen.scene.cameras[number]
     lens = camera.intrinsics
     picture = cv2.undistort(seen.scene.frames[camera.id][0], lens.matrix, lens.distortion)
@@ -148,7 +148,7 @@ def _matched(first: tuple[np.ndarray, np.ndarray], second: tuple[np.ndarray, np.
 
 
 def _corners(seen: Seen) -> np.ndarray:
-    """Where lines of a football pitch meet at an angle (K, 2), seen from the middle."""
+    """Return the points (K, 2) where lines of a football pitch meet at an angle."""
     pitch = seen.scene.pitch
     half_line = pitch.line_width / 2
     length, width = pitch.length / 2 - half_line, pitch.width / 2 - half_line
@@ -231,7 +231,7 @@ def by_homography(find: Displacement) -> Method:
 
 
 def learned(name: str) -> Method:
-    """The same by a net of `benchmarks.learned`; PyTorch is loaded by whoever asks it, and not in its time."""
+    """Find a homography by a net of `benchmarks.learned`; PyTorch is loaded before its time is taken."""
 
     def run(seen: Seen, cameras: list[Camera], seed: int) -> Answer:
         from benchmarks.learned.answers import displacement_by

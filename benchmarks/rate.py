@@ -60,7 +60,7 @@ STAND_IN = "stand-in for the engine"
 
 @dataclass
 class Seen:
-    """What was measured."""
+    """Samples of a measurement."""
 
     submitted: list[float] = field(default_factory=list)
     answers: Counter = field(default_factory=Counter)
@@ -131,7 +131,7 @@ def settings(folder: Path, database_url: str, chosen: argparse.Namespace) -> dic
 
 
 def line_of(message: Message) -> str:
-    """As the program of a job writes it."""
+    """Return a message as the program of a job writes it."""
     return message.model_dump_json(exclude_unset=True)
 
 
@@ -210,7 +210,7 @@ class _Ended(ExitStack):
 
 
 def figures(address: str) -> dict[str, float]:
-    """Those of the service, added up over their labels."""
+    """Return the metrics of the service, added up over their labels."""
     text = httpx.get(f"{address}/metrics", timeout=30).raise_for_status().text
     total: Counter = Counter()
     for family in text_string_to_metric_families(text):
@@ -295,7 +295,7 @@ def watch(address: str, seen: Seen, until: float) -> None:
 
 
 def state_of(database_url: str) -> dict[str, float]:
-    """What PostgreSQL has done and how much it holds."""
+    """Return counters and sizes of PostgreSQL."""
     with psycopg.connect(database_url, autocommit=True) as connection:
         # The statistics of other sessions are a second old at most once these are asked for again.
         time.sleep(1.5)

@@ -1,4 +1,4 @@
-"""What has been run already, a line of JSON for each run."""
+"""Results of runs, a line of JSON for each, so that long benchmarks can be continued."""
 
 from __future__ import annotations
 

@@ -32,7 +32,7 @@ START_M, START_DEG = 0.162, 2.1
 
 @dataclass(frozen=True)
 class Layout:
-    """Where the cameras of a venue stand (x, y, z) and what point of the ground they look at."""
+    """Positions (x, y, z) of the cameras of a venue, and the points of the ground that they look at."""
 
     positions: Sequence[tuple[float, float, float]]
     targets: Sequence[tuple[float, float]]
@@ -121,12 +121,12 @@ def _camera(name: str, position: np.ndarray, target: np.ndarray, rng: np.random.
 
 
 def seen_well(drawn: Conditions, **of_the_venue: float) -> Conditions:
-    """The same light on a usual pitch, through clear air and a good camera; `of_the_venue`: what is off in it."""
+    """Return the light on a usual pitch, through clear air and a good camera; `of_the_venue`: what is off in it."""
     return replace(drawn, variety=0.3, fog=0.0, blur=0.2, noise=0.15, sharpening=0.4, jpeg_quality=92, **of_the_venue)
 
 
 def as_built(camera: Camera, rng: np.random.Generator) -> Camera:
-    """The same camera with the lens it really has."""
+    """Return the camera with the lens it really has."""
     lens = camera.intrinsics
     matrix = lens.matrix.copy()
     matrix[[0, 1], [0, 1]] *= 1 + rng.normal(0, FOCAL_ERROR)

@@ -1,4 +1,4 @@
-"""How much of a seam is seen in a stitched view: `python -m benchmarks.seam [--pictures FOLDER]`.
+"""Steps of brightness and colour at the seam of a stitched view: `python -m benchmarks.seam [--pictures FOLDER]`.
 
 The demo's pair and the real pair are calibrated by a service from outdated poses. Beside each seam, in pieces of a few
 rows, the medians of what either camera shows are compared, colour by colour: as they are, and evened out. Printed: the
@@ -41,7 +41,7 @@ console = Console(highlight=False, soft_wrap=True)
 
 
 def main() -> int:
-    """Both pairs; the real one where its pictures are."""
+    """Measure the demo, and the real pair where its pictures are."""
     arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     arguments.add_argument("--pictures", type=Path, help="folder for the seams, enlarged")
     asked = arguments.parse_args()

@@ -93,7 +93,7 @@ def _whole_frame() -> Callable[[], object]:
 
 
 def _engine() -> Callable[[], object]:
-    """What a calibration does with the frame."""
+    """Return the pass that a calibration makes."""
     pitch, camera, frame = _demo_camera()
     segmenter = Segmenter(MODEL_PATH, THREADS)
     reach = CAPTURE_RAD * camera.intrinsics.matrix[0, 0]

@@ -1,4 +1,4 @@
-"""How still a shaking rig stands when it is followed: `python -m benchmarks.shaking`.
+"""Residual motion of a shaking rig when it is followed: `python -m benchmarks.shaking`.
 
 The two cameras of the demo on a mast in wind: each turns by 0.3 degrees at 0.5 Hz about each of its axes, in phases
 of its own, trembles by 0.03 degrees at 3 Hz, and sways by 2 cm, as a mast does that bends. Each frame is the demo's
@@ -62,12 +62,12 @@ UNLIKE = 0.2
 
 @dataclass(frozen=True)
 class Swing:
-    """How one camera shakes: phases (6, 2) of turns and shifts, at both frequencies."""
+    """Motion of one camera: phases (6, 2) of turns and shifts, at both frequencies."""
 
     phases: Array
 
     def change(self, seconds: float) -> Array:
-        """Of the pose, (6,): turn in the camera's frame (rad), shift in the world (m)."""
+        """Return the change of the pose, (6,): turn in the camera's frame (rad), shift in the world (m)."""
         swing, tremble = np.sin(2 * np.pi * seconds * np.array([SWING_HZ, TREMBLE_HZ]) + self.phases).T
         turn = np.radians(SWING_DEG) * swing[:3] + np.radians(TREMBLE_DEG) * tremble[:3]
         sway = SWAY_M * swing[3:] + SWAY_M * TREMBLE_DEG / SWING_DEG * tremble[3:]
@@ -106,11 +106,11 @@ class Clip:
         self._rays = np.concatenate([plane, np.ones_like(plane[..., :1])], axis=-1)
 
     def camera(self, number: int) -> Camera:
-        """Where it is when a frame is taken."""
+        """Return the true camera at a frame."""
         return moved(self.still, self._swing.change(number / FRAMES_PER_SECOND))
 
     def frame(self, number: int) -> Frame:
-        """What it shows then, as its sensor has it."""
+        """Return the picture of a frame, as the sensor has it."""
         now = self.camera(number)
         behind = self._behind(now)
         source = self._taken_by.project(behind).astype(np.float32)
@@ -124,7 +124,7 @@ class Clip:
         return np.clip(shaken + noise, 0, 255).astype(np.uint8)
 
     def _behind(self, now: Camera) -> Array:
-        """What of the world is behind the pixels of the grid: the ground, or what is far away."""
+        """Return the points of the world behind the pixels of the grid: on the ground, or far away."""
         rays = self._rays @ now.pose.matrix
         height = np.zeros(rays.shape[:2])
         for _ in range(4):
@@ -157,7 +157,7 @@ class Run:
 
 @dataclass
 class Told:
-    """What a follower said of all frames, and what it took: core milliseconds a frame and camera."""
+    """Poses that a follower gave for all frames, and its cost: core milliseconds a frame and camera."""
 
     run: Run
     moments: list[TrackedMoment]
@@ -187,7 +187,7 @@ class FarLine:
         self._across = beyond / np.linalg.norm(beyond, axis=1, keepdims=True)
 
     def by_truth(self, true: list[Camera], told: list[Camera]) -> Array:
-        """How far (N,) px across itself the line lies from its place in the view."""
+        """Return the distances (N,) px, across itself, of the line from its place in the view."""
         off = np.empty(len(self._points))
         for number, (real, believed) in enumerate(zip(true, told, strict=True)):
             its = self._camera == number
@@ -214,7 +214,7 @@ class FarLine:
 
 
 def moves(profiles: Array) -> Array:
-    """How far (T, N) px profiles (T, N, S) lie from their medians over time; NaN where something else is seen."""
+    """Return the shifts (T, N) px of profiles (T, N, S) from their medians over time; NaN behind players."""
     usual = np.median(profiles, axis=0)
     slope = np.gradient(usual, OFFSETS_PX, axis=1)
     off = profiles - usual
@@ -230,7 +230,7 @@ def moves(profiles: Array) -> Array:
 
 
 def clips(size: str, seed: int = 19, count: int = 2) -> tuple[Field, list[Clip]]:
-    """Those of the cameras of the demo, or of the real pair, whose lenses and lines are as lenses and lines are.
+    """Return the clips of the cameras of the demo, or of the real pair, whose lenses and lines are real.
 
     More than two stand where the demo's two do, each on a mast of its own.
     """
@@ -265,7 +265,7 @@ class Film:
 
     @classmethod
     def of(cls, size: str, count: int) -> Film:
-        """So many frames, at one of `SIZES`."""
+        """Return the film of so many frames, at one of `SIZES`."""
         pitch, made = clips(size)
         film = cls(pitch, made, count, [FOLDER / f"{clip.still.id}-{size}-{count}.mp4" for clip in made])
         for clip, path in zip(made, film.paths, strict=True):
@@ -282,7 +282,7 @@ class Film:
             yield {camera: picture.frame.to_ndarray(format="bgr24") for camera, picture in pictures.items()}
 
     def pictures(self) -> Iterator[dict[str, Picture]]:
-        """The same as the decoder left them."""
+        """Yield the pictures of each moment as the decoder left them, by camera."""
         with ExitStack() as stack:
             files = [stack.enter_context(av.open(str(path))) for path in self.paths]
             for moment in zip(*(file.decode(video=0) for file in files), strict=True):
@@ -319,7 +319,7 @@ def followed(film: Film, run: Run, lens: str) -> Told:
 
 
 def stored_camera(camera: Camera, number: int, lens: str) -> Camera:
-    """As the venue has it: a few centimetres and a tenth of a degree off; its lens `exact`, or as a `usual` one is."""
+    """Return the stored camera: some centimetres and a tenth of a degree off; its lens `exact` or `usual`."""
     rng = np.random.default_rng([20, number])
     known = camera if lens == "exact" else as_built(camera, rng)
     return known.with_pose(outdated(camera.pose, 0.05, 0.1, rng))
@@ -362,7 +362,7 @@ def report(film: Film, told: Told, width: int) -> None:
 
 
 def in_frames(film: Film, true: list[list[Camera]], told: list[list[Camera]]) -> float:
-    """How far lines lie from where cameras that are told expect them, about the mean of each place, px rms."""
+    """Return how far lines lie from where cameras expect them, about the mean of each place, px rms."""
     squares = []
     for number, clip in enumerate(film.clips):
         points = film.pitch.line_points(2.0).position
@@ -378,13 +378,13 @@ def in_frames(film: Film, true: list[list[Camera]], told: list[list[Camera]]) ->
 
 
 def rms_about_mean(values: Array) -> float:
-    """Of values (T, N), each about its own mean over time; NaN counts for nothing."""
+    """Return the rms of values (T, N), each about its own mean over time; NaN counts for nothing."""
     known = values[:, np.isfinite(values).any(axis=0)]
     return float(np.sqrt(np.nanmean((known - np.nanmean(known, axis=0)) ** 2)))
 
 
 def pose_rms(error: Array) -> str:
-    """Of errors (..., 6) of poses."""
+    """Return the rms of errors (..., 6) of poses, in words."""
     turn, shift = (np.sqrt(np.mean(np.sum(part**2, axis=-1))) for part in (error[..., :3], error[..., 3:]))
     return f"{np.degrees(turn):.4f} degrees and {100 * shift:.2f} cm rms"
 

@@ -1,4 +1,4 @@
-"""What a fleet of venues needs: measured figures in, the tables of docs/sizing.md out.
+"""Resources of a fleet of venues: measured figures in, the tables of docs/sizing.md out.
 
 `python -m benchmarks.sizing` prints the tables, `python -m benchmarks.sizing measure` measures again what
 one real job costs (the demo venue, two rendered 4K cameras); what a job costs the database `make bench-rate` says.
@@ -31,7 +31,7 @@ JOBS_MEASURED = 3
 
 @dataclass(frozen=True)
 class Measured:
-    """What one job of two 4K cameras costs."""
+    """Cost of one job of two 4K cameras."""
 
     # `make bench-cost`, near the stored pose, on two quiet cores of a rented server.
     core_s: float = 1.39
@@ -54,7 +54,7 @@ class Measured:
 
 @dataclass(frozen=True)
 class Chosen:
-    """What an operator decides."""
+    """Decisions of an operator."""
 
     every_s: float = 900
     # Of the cores that compute: the rest is for bursts, restarts and the night a machine is missing.
@@ -72,7 +72,7 @@ class Chosen:
 
 @dataclass(frozen=True)
 class Fleet:
-    """So many venues, and what follows."""
+    """Resources of so many venues."""
 
     venues: int
     job: Measured
@@ -88,7 +88,7 @@ class Fleet:
 
     @property
     def all_core_s(self) -> float:
-        """Of one job, with all that is around it."""
+        """Core-seconds of one job, with all that is around it."""
         job = self.job
         return job.core_s + job.worker_core_s + job.api_core_s + job.postgres_core_s
 
@@ -98,7 +98,7 @@ class Fleet:
 
     @property
     def joules_per_job(self) -> float:
-        """Of a small machine that has as much to do as it may."""
+        """Energy of a job on a small machine that has as much to do as it may."""
         return self.chosen.small_w * self.chosen.every_s / self.venues_on_a_small_machine
 
     @property
@@ -220,7 +220,7 @@ def energy(fleet: Fleet) -> str:
 
 
 def measure() -> None:
-    """What a real job costs, with nothing else on the machine."""
+    """Measure a real job, with nothing else on the machine."""
     with tempfile.TemporaryDirectory(prefix="esc-sizing-") as folder:
         data = Path(folder)
         environment = os.environ | {"ESC_DATA": folder, "ESC_LOG_LEVEL": "warning"}

@@ -40,7 +40,7 @@ ENCODING = ("-c:v", "libx264", "-preset", "veryfast", "-crf", "20")
 
 @dataclass(frozen=True)
 class Took:
-    """What a run took."""
+    """Cost of a run."""
 
     wall_s: float
     core_s: float
@@ -124,7 +124,7 @@ def _panorama(home: Path, frames: dict[str, np.ndarray], lit: bool) -> Panorama:
 
 
 def _package(home: Path, shown: Panorama) -> None:
-    """What ffmpeg samples by: the nearest pixel for each of the view, and how much the second camera counts."""
+    """Write the maps of ffmpeg: the nearest pixel for each of the view, and how much the second camera counts."""
     for part in shown.parts:
         nearest = np.where(part.weight[..., None] > 0, np.rint(part.source), 65535).clip(0, 65535).astype(np.uint16)
         for axis, name in enumerate("xy"):

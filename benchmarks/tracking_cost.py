@@ -1,4 +1,4 @@
-"""What following costs: core-ms of a 4K picture and camera by part, `python -m benchmarks.tracking_cost`.
+"""Cost of following: core-ms of a 4K picture and camera by part, `python -m benchmarks.tracking_cost`.
 
 The cameras of `benchmarks.shaking` in 4K, four seconds of each, from the decoder's pictures to their poses, on
 one thread; decoding is told beside it. While pieces of line are learned all of them are looked at, then a few.
@@ -76,7 +76,7 @@ class Meter:
         self._inner = [0.0]
 
     def of(self, part: str, call: Callable[..., Any]) -> Callable[..., Any]:
-        """The same call, its time counted."""
+        """Return a call whose time is counted."""
 
         @wraps(call)
         def metered(*given: Any, **named: Any) -> Any:
@@ -109,7 +109,7 @@ class Meter:
 
 
 def rows(film: Film) -> list[dict[str, float]]:
-    """What each picture after the first of each camera costs, core-ms by part."""
+    """Return the cost of each picture after the first of each camera, core-ms by part."""
     found = []
     for number, (clip, path) in enumerate(zip(film.clips, film.paths, strict=True)):
         stored = stored_camera(clip.still, number, "exact")
@@ -147,7 +147,7 @@ def table(found: list[dict[str, float]]) -> list[str]:
 
 
 def before(folder: Path, film: Film) -> list[str]:
-    """The same of an earlier release."""
+    """Return the rows of an earlier release."""
     python = folder / ".venv/bin/python"
     (pictures,) = (p.stem for p in (folder / "worker/video").glob("*.py") if "def picture_of(" in p.read_text())
     command = [python if python.exists() else sys.executable, "-c", BEFORE.format(pictures=pictures)]

@@ -1,4 +1,4 @@
-"""How far poses are from the true ones, in the paper's four figures."""
+"""Errors of poses, in the paper's four figures."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def apart(a: Camera, b: Camera) -> tuple[float, float]:
 
 
 def placed(scene: Scene, camera: Camera, pixel: np.ndarray) -> np.ndarray:
-    """Where on the roof (x, y) a camera puts a pixel (2,)."""
+    """Return the place on the roof (x, y) where a camera puts a pixel (2,)."""
     ray = camera.rays(pixel)
     height = 0.0
     for _ in range(30):
@@ -75,7 +75,7 @@ def apart_by_homography_px(scene: Scene, i: int, j: int, homography: np.ndarray)
 
 
 def _pinhole(lens: Lens, pixel: np.ndarray) -> np.ndarray:
-    """Where a pixel (2,) is in the undistorted picture, (3,) homogeneous."""
+    """Return a pixel (2,) in the undistorted picture, (3,) homogeneous."""
     return lens.matrix @ np.append(lens.undistort(pixel), 1.0)
 
 

@@ -35,7 +35,7 @@ from worker.calibration.refinement.refine import refine
 
 @dataclass(frozen=True)
 class Mistake:
-    """What is given wrong: numbers of the `lens` as in `lenses.py`, or a field that is really larger by parts of
+    """A wrong input: numbers of the `lens` as in `lenses.py`, or a field that is really larger by parts of
     `length` and `width`, said to be known to `sigma_m`, or has its touchlines shifted by `skew_m` along themselves."""
 
     name: str
@@ -58,7 +58,7 @@ class Mistake:
         )
 
     def displaced(self, lines: LinePoints) -> np.ndarray:
-        """Where the line points (N, 3) of `PITCH` really are."""
+        """Return the real places of the line points (N, 3) of `PITCH`."""
         there = PITCH.resized(length=PITCH.length * (1 + self.length), width=PITCH.width * (1 + self.width))
         x, y, z = there.same_line_points(lines).position.T
         return np.stack([x + self.skew_m * y / (PITCH.width / 2), y, z], axis=1)
@@ -88,7 +88,7 @@ WIND_M, WIND_DEG, FOUND_M, FOUND_DEG = 0.005, 0.01, 0.02, 0.03
 
 @dataclass(frozen=True)
 class Answer:
-    """What a step answered: its error and sigma (m), and whether it was accepted."""
+    """Answer of a step: its error and sigma (m), and whether it was accepted."""
 
     error_m: float
     sigma_m: float
@@ -102,7 +102,7 @@ class Answer:
 
     @property
     def wrong(self) -> bool:
-        """Whether it was taken, and is farther off than it says, or than anything may be."""
+        """True if it was accepted, and is farther off than three of its sigmas, or than 30 cm."""
         beyond = self.error_m > SIGMAS * self.sigma_m + LEAST_WRONG_M
         return self.accepted and (beyond or self.error_m > FARTHEST_M)
 
@@ -168,7 +168,7 @@ def _later(
     real: Camera,
     night: Callable[[float, Camera, CameraMemory | None], tuple[CameraResult, CameraMemory | None]],
 ) -> Iterator[Answer]:
-    """What comes after a venue was stored as it was found."""
+    """Yield the answers after a venue was stored as it was found."""
     stored, memory = found, None
     refined = None
     for step in STEPS[1:]:

@@ -52,7 +52,7 @@ def main() -> int:
 
 
 def run(home: Home, folder: Path, release: Release, pairing: str, jobs: int) -> tuple[int, int, int]:
-    """How many of the jobs succeeded, at the first attempt, and moved their venue once."""
+    """Return how many jobs succeeded, how many at the first attempt, and how many moved their venue once."""
     apis, versions = PAIRINGS.get(pairing, ([OLD, NEW], [OLD, OLD]))
     given = environment(home.settings(folder)) | {"ESC_QUEUE_LIMIT": str(2 * jobs)}
     with ExitStack() as stack:

@@ -1,4 +1,4 @@
-"""What has to add up whenever nothing is open: jobs, poses, the queue and the files, read beside the service."""
+"""Consistency of jobs, poses, the queue and the files when nothing is open, read beside the service."""
 
 import os
 from collections import Counter
@@ -29,7 +29,7 @@ def settle(service: Service) -> None:
 
 
 def unsettled(service: Service) -> Iterator[str]:
-    """What is still to be done."""
+    """Yield open jobs, folders to be deleted and open entries of the queue."""
     with service.database() as connection:
         yield from connection.scalars(sa.select(tables.jobs.c.id).where(tables.jobs.c.status.in_(OPEN_STATUSES)))
         yield from connection.scalars(sa.select(tables.leftovers.c.folder))
@@ -37,7 +37,7 @@ def unsettled(service: Service) -> Iterator[str]:
 
 
 def mistakes(service: Service) -> Iterator[str]:
-    """What does not add up, in words."""
+    """Yield each inconsistency, in words."""
     with service.database() as connection:
         jobs = connection.execute(sa.select(tables.jobs)).all()
         revisions = connection.execute(sa.select(tables.revisions).order_by(tables.revisions.c.id)).all()

@@ -17,6 +17,6 @@ def solve(venue, files, options, means, report, nights=NO_HISTORY, **others):
 
 
 def history_of(task):
-    """What is known of the nights before a task."""
+    """Return what is known of the nights before a task."""
     given = read_record(inputs.Task, task.model_dump(mode="json"))
     return NightHistory(given.last_views, given.memories, given.anchors, given.taken_at)

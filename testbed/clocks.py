@@ -7,7 +7,7 @@ MOVED_CLOCK = Path(__file__).parent / "moved_clock"
 
 
 class Clock:
-    """How far it is ahead stands in a file, which the processes that have its `environment` read each time."""
+    """A clock whose offset stands in a file, which the processes that have its `environment` read each time."""
 
     def __init__(self, folder: Path, ahead_s: float = 0) -> None:
         self._file = folder / "clock"

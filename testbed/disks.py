@@ -9,7 +9,7 @@ from pathlib import Path
 
 
 def may_mount() -> bool:
-    """Whether this process may make a disk; within a container root often may not."""
+    """True if this process may mount a disk; within a container root often may not."""
     return os.geteuid() == 0 and subprocess.run(["unshare", "--mount", "true"], capture_output=True).returncode == 0
 
 

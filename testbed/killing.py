@@ -23,7 +23,7 @@ SEED = "ESC_TEST_SEED"
 
 @dataclass(frozen=True)
 class Death:
-    """Of a worker, and the end of the job; seconds since the kill, until another began the job if this one had."""
+    """Death of a worker, and the end of its job; seconds from the kill, and until another worker began it."""
 
     worker: str
     job: dict
@@ -32,7 +32,7 @@ class Death:
 
 
 def chance() -> random.Random:
-    """What moments are drawn from, with a seed that is printed: pytest shows it when a test fails."""
+    """Return a generator of moments, with a seed that is printed: pytest shows it when a test fails."""
     seed = int(os.environ.get(SEED) or secrets.randbits(32))
     print(f"{SEED}={seed}", file=sys.stderr)
     return random.Random(seed)

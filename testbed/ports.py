@@ -21,5 +21,5 @@ def free_port(kind=socket.SOCK_STREAM):
 
 
 def is_listened_on(port, protocol="tcp"):
-    """Whether a socket is bound to a port and connected to nobody, so that it waits for whoever comes."""
+    """True if a socket listens on a port: it is bound and connected to nobody."""
     return f":{port:04X} 00000000:0000 " in Path(f"/proc/net/{protocol}").read_text()

@@ -198,7 +198,7 @@ def candidate(away_m: float) -> dict:
 
 
 def remembered(task: dict, cameras: list[str]) -> dict:
-    """What each camera remembers: how many jobs it was in, and when its frames of the last one were taken."""
+    """Return the memory of each camera: how many jobs it was in, and when its frames of the last one were taken."""
     return {
         camera: {"jobs": task["memories"].get(camera, {"jobs": 0})["jobs"] + 1, "last": task["taken_at"]}
         for camera in cameras

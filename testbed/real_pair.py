@@ -60,7 +60,7 @@ class RealPair:
         return self.clicked_rms_of(next(c for c in self.cameras if c.id == camera_id).with_pose(pose))
 
     def clicked_rms_of(self, camera: Camera) -> float:
-        """The same of a camera with a lens of its own."""
+        """Rms (px) of the hand-clicked pitch points for a camera with a lens of its own."""
         world = np.array([click["world"] for click in self.clicks[camera.id]], dtype=float)
         pixel = np.array([click["pixel"] for click in self.clicks[camera.id]])
         off = camera.project(self.pitch.lift(world)) - pixel

@@ -20,7 +20,7 @@ DUMPS = ROOT / "tests" / "released" / "dumps"
 
 
 def is_in_git() -> bool:
-    """Whether this is a clone that has the release in its history."""
+    """True if this is a clone that has the release in its history."""
     found = _git("cat-file", "-e", f"{COMMIT}^{{commit}}", check=False)
     return found is not None and found.returncode == 0
 

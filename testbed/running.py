@@ -122,7 +122,7 @@ class Service:
         return wait_for(lambda: (job := self.job(job_id))["progress"] and job)
 
     def files(self, folder: str) -> list[str]:
-        """What the service has stored."""
+        """Return the paths that the service has stored below a folder."""
         return files(self.blob_url, folder)
 
     @contextmanager
@@ -192,7 +192,7 @@ def keys_in(data: Path) -> KeyRepository:
 
 
 def ready(http: httpx.Client) -> bool:
-    """Whether a service answers and has all that jobs need; earlier releases said so by the status alone."""
+    """True if a service answers and has all that jobs need; earlier releases said so by the status alone."""
     said = http.get("/readyz")
     return said.status_code == 200 and not said.json().get("warnings")
 
@@ -223,7 +223,7 @@ def leads_a_session(process: int) -> bool:
 
 
 def alive(process: int) -> bool:
-    """Whether a process runs (a zombie does not)."""
+    """True if a process runs (a zombie does not)."""
     try:
         return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except FileNotFoundError:

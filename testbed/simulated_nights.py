@@ -62,7 +62,7 @@ class Painted:
         return self.pitch.markings()[int(np.argmax(np.bincount(seen.points.marking)))].name
 
     def painted_anew(self, name: str, aside_m: float) -> Painted:
-        """The same with one marking that lies so far aside from now on."""
+        """Return the field with one marking so far aside."""
         number = [marking.name for marking in self.pitch.markings()].index(name)
         its = self.lines.marking == number
         return replace(self, there=self.there + its[:, None] * aside_m * self.lines.normal)
@@ -70,7 +70,7 @@ class Painted:
 
 @dataclass
 class SimulatedSight:
-    """What a finish looks at on one night: `real` cameras before a painted field. `noise` (C, N) px along normals."""
+    """Measurements of one night: `real` cameras before a painted field. `noise` (C, N) px along normals."""
 
     painted: Painted
     real: Sequence[Camera]
@@ -82,15 +82,15 @@ class SimulatedSight:
         return cls(painted, real, shared + np.sqrt(NOISE_PX**2 - SHARED_PX**2) * rng.normal(size=shared.shape))
 
     def of(self, numbers: Sequence[int]) -> SimulatedSight:
-        """That of some of the cameras."""
+        """Return the sight of some of the cameras."""
         return SimulatedSight(self.painted, [self.real[n] for n in numbers], self.noise[list(numbers)])
 
     def reader(self) -> SimulatedSight:
-        """What measures the lines in it."""
+        """Return what measures the lines in it."""
         return self
 
     def read_anew(self) -> None:
-        """Nothing is read."""
+        """Do nothing: there is no frame to read."""
 
     def measure(self, lines: LinePoints, cameras: Sequence[Camera], search_px: float) -> list[Measurements]:
         """The lines within `search_px` of where each camera expects them."""

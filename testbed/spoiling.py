@@ -1,4 +1,4 @@
-"""What can be wrong with a view, done to good frames: light, air, lens, weather, and things in front."""
+"""Defects of a view, done to good frames: light, air, lens, weather, and things in front."""
 
 import cv2
 import numpy as np

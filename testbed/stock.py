@@ -33,7 +33,7 @@ class Stock(Repositories):
         self.enqueued: list[str] = []
 
     def submission(self, venue_id: str, **options) -> Submission:
-        """What is about to become a job."""
+        """Return a submission of a venue."""
         job_id = new_id()
         return Submission(
             job_id=job_id,
@@ -84,7 +84,7 @@ class Stock(Repositories):
         self.venues.put(venue.model_copy(update={"cameras": cameras}), anyway)
 
     def time_passes(self, **time: float) -> None:
-        """All that alarms go by was so much earlier."""
+        """Move all that alarms go by so much into the past."""
         by = timedelta(**time)
         moments = {tables.revisions: ["at"], tables.venue_quality: ["accepted_at", "alarm_due_at"]}
         with self.engine.begin() as connection:
@@ -96,7 +96,7 @@ class Stock(Repositories):
                         connection.execute(sa.update(table).where(*key).values(earlier))
 
     def alarms_told(self) -> list[AlarmEvent]:
-        """What is to be told of alarms, as it happened."""
+        """Return the events of alarms that are to be sent, in their order."""
         d = tables.deliveries.c
         with self.engine.connect() as connection:
             numbers = connection.scalars(sa.select(d.event).where(d.event.is_not(None))).all()
@@ -104,7 +104,7 @@ class Stock(Repositories):
         return sorted(told, key=lambda event: (event.timestamp, event.data.rule, event.data.camera or ""))
 
     def callbacks(self) -> dict[str, int]:
-        """How many are in each state."""
+        """Count the callbacks in each state."""
         d = tables.deliveries.c
         with self.engine.connect() as connection:
             rows = connection.execute(sa.select(d.status, sa.func.count().label("n")).group_by(d.status))

@@ -58,7 +58,7 @@ def pair(distortion: tuple[float, ...] = BARREL) -> list[Camera]:
 
 @cache
 def pair_markings(distortion: tuple[float, ...] = BARREL) -> tuple[NDArray[np.float32], ...]:
-    """What the pair sees of the markings of the crowned pitch: painted once for all tests of a process."""
+    """Return what the pair sees of the markings of the crowned pitch: painted once for all tests of a process."""
     return tuple(_shared(paint_markings(CROWNED, one)) for one in pair(distortion))
 
 
@@ -136,7 +136,7 @@ def _met(pitch: Field, camera: Camera, rays: Array) -> Array:
 
 
 def _close(marking: Marking, points: Array) -> NDArray[np.bool_]:
-    """Whether a marking may reach into the blocks (h, w) with these points (h, w, 2) in their middles."""
+    """True where a marking may reach into the blocks (h, w) with these points (h, w, 2) in their middles."""
     across, along, half_length = _place(marking, points)
     return (np.abs(across) < marking.width / 2 + _step(across)) & (np.abs(along) < half_length + _step(along))
 
@@ -148,7 +148,7 @@ def _covered(marking: Marking, points: Array) -> Array:
 
 
 def _place(marking: Marking, points: Array) -> tuple[Array, Array, float]:
-    """How far points (..., 2) are from the line and from its middle along it, and half its length."""
+    """Return the distances of points (..., 2) from the line and from its middle along it, and half its length."""
     start, end = marking.centre[0], marking.centre[-1]
     if len(marking.centre) == 2:
         direction = (end - start) / np.linalg.norm(end - start)
@@ -174,13 +174,13 @@ def _place(marking: Marking, points: Array) -> tuple[Array, Array, float]:
 
 
 def _step(distance: Array) -> Array:
-    """How much (..., h, w) a distance may change from one sample to the next."""
+    """Return the change (..., h, w) of a distance from one sample to the next."""
     down, right = np.gradient(distance, axis=(-2, -1))
     return np.abs(down) + np.abs(right)
 
 
 def _box(distance: Array, half_width: float) -> Array:
-    """How much of a sample of the size of the distance's step lies within `half_width`."""
+    """Return the share of a sample, as large as the distance's step, that lies within `half_width`."""
     down, right = np.gradient(distance, axis=(-2, -1))
     step = np.maximum(np.hypot(down, right), 1e-9)
     return np.clip((distance + half_width) / step + 0.5, 0, 1) - np.clip((distance - half_width) / step + 0.5, 0, 1)

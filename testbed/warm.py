@@ -48,7 +48,7 @@ class Popen(subprocess.Popen):
 
 
 def arguments_of(command, environment) -> list[str] | None:
-    """What `service.cli` is given by a command; None if the warm parent cannot stand in for its interpreter."""
+    """Return the arguments of `service.cli` in a command; None if the warm parent cannot run it."""
     environment = os.environ if environment is None else environment
     if sys.platform != "linux" or isinstance(command, str):
         return None
@@ -64,7 +64,7 @@ def of_the_interpreter(environment) -> dict[str, str]:
 
 @functools.cache
 def warm_parent() -> "WarmParent":
-    """That of this process; it ends with it."""
+    """Return the warm parent of this process, which ends with it."""
     return WarmParent()
 
 
@@ -119,14 +119,14 @@ class SpareWorker:
         become(*json.loads(asked))
 
     def begin(self, arguments: list[str], folder: str, environment: dict[str, str]) -> int | None:
-        """Its id, now that it runs."""
+        """Start the worker, and return its process id."""
         with os.fdopen(self._writer, "wb") as pipe:
             pipe.write(json.dumps([arguments, folder, environment]).encode())
         return self.pid
 
 
 def spare_workers() -> list[SpareWorker]:
-    """Those of this process; none in each of them, which goes on from here as the worker that it is asked to be."""
+    """Fork the spare workers of this process; each of them goes on from here as the worker that it is asked to be."""
     spare: list[SpareWorker] = []
     while len(spare) < SPARE_WORKERS:
         spare.append(SpareWorker(spare))
@@ -136,7 +136,7 @@ def spare_workers() -> list[SpareWorker]:
 
 
 def kept_by(waiting: list[SpareWorker]) -> type[subprocess.Popen]:
-    """What `esc up` starts its worker with: the spare ones first, later ones as always."""
+    """Return the start of workers of `esc up`: the spare ones first, later ones as always."""
 
     class Kept(subprocess.Popen):
         def _execute_child(self, args, *how):
@@ -151,7 +151,7 @@ def kept_by(waiting: list[SpareWorker]) -> type[subprocess.Popen]:
 
 
 def become(arguments: list[str], folder: str, environment: dict[str, str]) -> None:
-    """This process from now on: its arguments, its folder, its environment."""
+    """Take on arguments, folder and environment of another process."""
     os.environ.clear()
     os.environ.update(environment)
     time.tzset()

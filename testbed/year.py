@@ -72,7 +72,7 @@ def stored(of: Sequence[Camera], rules: Rules, sigma: Sigma | None = None) -> Ve
 
 
 class Clock:
-    """What the store takes for the time: it goes on by a millisecond a look, and by days when somebody says so."""
+    """Clock of the store: it goes on by a millisecond a look, and by days when somebody says so."""
 
     def __init__(self) -> None:
         self._now = BEGINS
@@ -129,7 +129,7 @@ class Year:
         return found.result
 
     def wrong_by_px(self, truth: Sequence[Camera]) -> list[float]:
-        """How far each stored camera is from where it really is, in its picture."""
+        """Return the distance of each stored camera from the real one, px in its picture."""
         pairs = zip(stored(truth, self.rules).cameras, self.venue.cameras, strict=True)
         return [movement.moved(self.venue.field, really.posed, held.posed).pixels for really, held in pairs]
 
@@ -139,5 +139,5 @@ class Year:
 
 
 def frames_of(truth: Sequence[Camera], pitch: Field = CROWNED) -> Frames:
-    """What the cameras see of a pitch."""
+    """Return the frames of cameras before a pitch."""
     return {c.id: paint_frame(pitch, c) for c in truth}

@@ -95,7 +95,7 @@ def row(release: Release, cameras: str, start: str, number: int) -> dict:
 
 
 def measure(release: Release, asked: Case) -> dict:
-    """What a job costs from POST to the result, and what it costs to look at its pictures then."""
+    """Measure a job from POST to its result, and then the time to fetch its pictures."""
     release.http.put(f"/venues/{asked.name}", json=asked.venue).raise_for_status()
     release.notes.unlink(missing_ok=True)
     begun = time.monotonic()

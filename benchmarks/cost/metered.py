@@ -47,7 +47,7 @@ def main(notes: str, *program: str) -> None:
 
 
 def note(notes: str, moments: list[tuple[str, float, float]], process: int) -> None:
-    """What lies between each moment and the next belongs to the stage that began."""
+    """Write the costs by stage: each stage lasts from its moment to the next."""
     spent: dict[str, list[float]] = {}
     for (stage, core, wall), (_, core_after, wall_after) in pairwise(moments):
         before = spent.get(stage, [0.0, 0.0])

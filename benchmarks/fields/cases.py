@@ -46,17 +46,17 @@ class Case:
 
     @property
     def reference_px(self) -> float:
-        """How far the measured places are from where the reference pose puts them."""
+        """Rms distance of the measured places from where the reference pose puts them."""
         return self.rms_px(self.camera)
 
     def rms_px(self, camera: Camera) -> float:
-        """How far the measured places are from where a camera puts them; infinite where it does not see them all."""
+        """Rms distance of the measured places from where a camera puts them; infinite if it does not see all."""
         off = camera.project(self.world) - self.pixel
         return float(np.sqrt((off**2).sum(axis=1).mean())) if np.isfinite(off).all() else float("inf")
 
 
 def cases(folder: Path, chosen: Sequence[str] | None) -> list[Case]:
-    """Those with a camera, and with one of `chosen` in their names."""
+    """Return the cases with a camera, and with one of `chosen` in their names."""
     entries = json.loads((folder / "cases.json").read_text())
     return [
         _case(folder, entry)

@@ -31,12 +31,12 @@ class Answer:
 
     @property
     def accepted(self) -> bool:
-        """Whether the gate let it pass."""
+        """True if the gate accepted it."""
         return self.said is not None and self.said.accepted
 
     @property
     def row(self) -> dict:
-        """What there is to remember of it, the cameras apart."""
+        """The answer as a row, without its cameras."""
         return {
             "accepted": self.accepted,
             "why": self.why,
@@ -73,7 +73,7 @@ class Engine:
 
 
 def camera_row(result: CameraResult) -> dict:
-    """What the engine says of one camera."""
+    """Return the result of one camera as a row."""
     return {
         "rotation": result.camera.pose.rotation.tolist(),
         "position": result.camera.pose.position.tolist(),

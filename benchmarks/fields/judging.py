@@ -1,4 +1,4 @@
-"""What counts as right and as wrong, and what refusals have in common."""
+"""Limits of right and wrong answers, and reasons of refusals without their numbers."""
 
 from __future__ import annotations
 
@@ -17,29 +17,29 @@ NEAR = 1.5
 
 
 def near(rms_px: float, reference_px: float, tolerance_px: float) -> bool:
-    """Whether a real camera was found, by the points measured in its frame."""
+    """True if a real camera was found, by the points measured in its frame."""
     return rms_px <= max(NEAR * reference_px, tolerance_px)
 
 
 def outcome(accepted: bool, near: bool) -> str:
-    """One of four ends of a start."""
+    """Return which of four ends a start came to."""
     if accepted:
         return "accepted and near" if near else "accepted but wrong"
     return "refused though near" if near else "refused and off"
 
 
 def caught(row: dict) -> bool:
-    """Whether a rendered camera was accepted where it is."""
+    """True if a rendered camera was accepted where it is."""
     return row["accepted"] and row["shift_m"] <= CAUGHT_M and row["turn_deg"] <= CAUGHT_DEG
 
 
 def far_off(row: dict) -> bool:
-    """Whether a rendered camera was accepted where it is not."""
+    """True if a rendered camera was accepted where it is not."""
     return row["accepted"] and row["shift_m"] > WRONG_M
 
 
 def overconfident(row: dict) -> bool:
-    """Whether a rendered camera was accepted farther off than it says it may be."""
+    """True if a rendered camera was accepted farther off than three of its sigmas."""
     claims = ((row["shift_m"], row["sigma_m"]), (row["turn_deg"], row["sigma_deg"]))
     return row["accepted"] and any(said is not None and off > WRONG_SIGMAS * said for off, said in claims)
 
@@ -51,7 +51,7 @@ def reason(why: str) -> str:
 
 
 def reasons(rows: Iterable[dict]) -> str:
-    """How often which refusal."""
+    """Return the refusals with their counts, most frequent first."""
     counted = Counter(reason(row["why"]) for row in rows if not row["accepted"])
     return "; ".join(f"{count} x {text}" for text, count in counted.most_common())
 

@@ -22,7 +22,7 @@ OUTCOMES = ("accepted and near", "accepted but wrong", "refused though near", "r
 
 
 def section(options: argparse.Namespace, engine: Engine) -> Iterator[str]:
-    """Both tables, source by source."""
+    """Yield what is seen and what is found, source by source."""
     if not (options.folder / "cases.json").is_file():
         yield f"The real frames are not there: put them into {options.folder}, with their cases.json."
         return

@@ -1,4 +1,4 @@
-"""What is seen of the lines of a field at the reference pose: by the network alone, and by both witnesses together."""
+"""Detection of the lines of a field at the reference pose: by the network alone, and by both witnesses together."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def seen(case: Case, segment: Segment) -> dict:
 
 
 def _timed(run: Callable[[], T]) -> tuple[T, list[float]]:
-    """What it gives, and the seconds and core-seconds it takes."""
+    """Return what a call gives, and its seconds and core-seconds."""
     wall, cpu = time.perf_counter(), time.process_time()
     given = run()
     return given, [time.perf_counter() - wall, time.process_time() - cpu]
@@ -112,7 +112,7 @@ def _paint(lines: LinePoints, camera: Camera) -> np.ndarray:
 
 
 def _outline(case: Case) -> np.ndarray:
-    """Where (H, W) the field is in the frame, half a metre beside its lines included."""
+    """Return the mask (H, W) of the field in the frame, half a metre beside its lines included."""
     x, y = np.abs(case.pitch.line_points().position[:, :2]).max(axis=0) + AROUND_M
     # In cells: an outline is no polygon where part of it is behind the camera.
     steps = [max(8, round(50 * side / max(x, y))) for side in (x, y)]

@@ -141,7 +141,7 @@ def _out_of_reach(camera: Camera, start: Camera) -> bool:
 
 
 def _is_its_own_mirror_image(view: View) -> bool:
-    """Whether the mirrored picture is one of the same field, which has two like ends, from about the same place."""
+    """True if the mirrored picture is one of the same field, which has two like ends, from about the same place."""
     flip = np.diag([-1.0, 1.0, 1.0])
     pose = view.camera.pose
     mirrored = Pose(rotation_vectors(flip @ pose.matrix @ flip), flip @ pose.position)

@@ -1,4 +1,4 @@
-"""What the trained nets answer."""
+"""Answers of the trained nets."""
 
 from __future__ import annotations
 

@@ -46,7 +46,7 @@ class Dhn(Net):
         return functional.smooth_l1_loss(self(batch.seen, batch.template), batch.offsets)
 
     def answer(self, seen: Tensor, template: Tensor, steps: int | None = None) -> Tensor:
-        """What it says when it is used."""
+        """Return the displacements, without gradients."""
         with torch.no_grad():
             return self(seen, template)
 

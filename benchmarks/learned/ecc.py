@@ -26,7 +26,7 @@ ENDS = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 60, 1e-4)
 
 
 def aligned(seen: Picture, template: Picture) -> Array:
-    """How far the points of `QUAD` have to move (4, 2), by the levels that found something."""
+    """Return the displacements (4, 2) of the points of `QUAD`, by the levels that found something."""
     found = np.eye(3, dtype=np.float32)
     for blur, motion in LEVELS:
         pictures = (cv2.GaussianBlur(picture, (0, 0), blur) for picture in (seen, template))

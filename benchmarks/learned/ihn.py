@@ -86,13 +86,13 @@ class Ihn(Net):
         return weighted.sum() / sum(weights)
 
     def answer(self, seen: Tensor, template: Tensor, steps: int | None = None) -> Tensor:
-        """What it says when it is used."""
+        """Return the displacements after the last step, without gradients."""
         with torch.no_grad():
             return self(seen, template, steps or STEPS)[-1]
 
 
 def likeness(asking: Tensor, answering: Tensor) -> list[Tensor]:
-    """How alike each asking place (Q of them) is to all of the answering ones: (B, Q, h, w), then at half the size."""
+    """Correlate each asking place (Q of them) with all of the answering ones: (B, Q, h, w), then at half the size."""
     batch, features, height, width = answering.shape
     product = (asking / math.sqrt(features)).flatten(2).transpose(1, 2) @ answering.flatten(2)
     levels = [product.reshape(batch, -1, height, width)]

@@ -1,4 +1,4 @@
-"""What the three nets have in common."""
+"""Base class of the three nets."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ N = TypeVar("N", bound=nn.Module)
 
 
 class Net(nn.Module, ABC):
-    """What can be trained and asked; `tried_steps`: after how many it is looked how good its answers are."""
+    """A net that can be trained and asked; `tried_steps`: the numbers of steps at which it is validated."""
 
     tried_steps: tuple[int, ...]
 
     @abstractmethod
     def loss(self, batch: Batch) -> Tensor:
-        """What is descended, ()."""
+        """Return the loss of a batch, ()."""
 
     @abstractmethod
     def answer(self, seen: Tensor, template: Tensor, steps: int | None = None) -> Tensor:

@@ -59,7 +59,7 @@ class Otle(Net):
         return loaded("dhn", Dhn()).to(next(self.parameters()).device)
 
     def descended(self, seen: Tensor, template: Tensor, first: Tensor, steps: int) -> Tensor:
-        """The same from another first guess (B, 4, 2)."""
+        """Return the displacements by descent from a first guess (B, 4, 2)."""
         offsets = first.clone().requires_grad_()
         optimiser = torch.optim.Adam([offsets], lr=FIRST_STEP_PX, betas=(0.8, 0.95))
         best, least = first.clone(), first.new_full((len(first),), torch.inf)

@@ -1,4 +1,4 @@
-"""What the nets learn from: drawn masks, seen by a camera that is believed to stand elsewhere, and templates.
+"""Training pairs: drawn masks, seen by a camera that is believed to stand elsewhere, and templates.
 
 No frame is rendered and no network is asked: the markings are projected by the true pose, laid back onto the ground by
 the wrong one and drawn as lines, a pair in a few milliseconds. What the real segmentation adds is drawn as well:
@@ -116,7 +116,7 @@ def random_camera(pitch: Field, rng: np.random.Generator) -> Camera:
 
 
 def drawn_pair(ground: Ground, true: Camera, wrong: Pose, rng: np.random.Generator) -> Pair | None:
-    """What `true` sees, laid onto the ground by the pose `wrong`; None where too little of the pitch is in sight."""
+    """Lay what `true` sees onto the ground by the pose `wrong`; None where too little of the pitch is in sight."""
     window = Window.of(wrong)
     corrected = placed(ground.pitch.lift(window.ground(QUAD)), true.pose, wrong, ground.pitch)
     if not np.isfinite(corrected).all():
@@ -154,7 +154,7 @@ def _lines(
 
 
 def _kept(points: LinePoints, rng: np.random.Generator) -> NDArray[np.bool_]:
-    """Which of the points (N,) are not worn away: some markings are missing whole, of others a stretch is."""
+    """Return the mask (N,) of points that are not worn away: whole markings and stretches of others are."""
     whole = rng.random(points.marking.max() + 1) >= rng.choice([0.0, 0.05, 0.25])
     kept = whole[points.marking]
     for _ in range(rng.integers(0, 8)):

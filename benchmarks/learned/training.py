@@ -1,4 +1,4 @@
-"""How the nets are trained: all on the same batches, by steps, with checkpoints, from where they stopped."""
+"""Training of the nets: all on the same batches, by steps, with checkpoints, from where they stopped."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class Training:
         return f"{self.name} {mean:.3f}"
 
     def save(self) -> None:
-        """Everything needed to go on."""
+        """Write all that is needed to go on."""
         path = weights(self.name)
         path.parent.mkdir(parents=True, exist_ok=True)
         partial = path.with_suffix(".partial")
@@ -97,7 +97,7 @@ def _summary(training: Training) -> dict[str, object]:
 
 
 def validated(net: Net) -> dict[str, dict[str, float]]:
-    """How far the four points are off on pairs that were never learnt from, in pixels of the window, by steps."""
+    """Return the errors of the four points on pairs that were never learnt from, in pixels of the window, by steps."""
     net.eval()
     device = next(net.parameters()).device
     batch = batch_of(list(islice(Pairs(VALIDATION_SEED), VALIDATED_BY)))
@@ -110,7 +110,7 @@ def validated(net: Net) -> dict[str, dict[str, float]]:
 
 
 def _spread(off: Tensor) -> dict[str, float]:
-    """Of distances (B, 4, 2): their mean, and what half and nine in ten of the pairs stay below."""
+    """Return the mean, median and 90th percentile over the pairs of distances (B, 4, 2)."""
     distance = off.norm(dim=-1).mean(dim=1)
     return {
         "mean_px": round(float(distance.mean()), 3),

@@ -29,7 +29,7 @@ def homographies(offsets: Tensor) -> Tensor:
 
 
 def moved(points: Tensor, through: Tensor) -> Tensor:
-    """Where points (N, 2) in pixels come to lie by homographies (B, 3, 3): (B, N, 2) in pixels."""
+    """Map points (N, 2) in pixels by homographies (B, 3, 3): (B, N, 2) in pixels."""
     at = scaled(points)
     homogeneous = torch.cat([at, torch.ones_like(at[:, :1])], dim=1) @ through.transpose(1, 2)
     # What would come from beyond the horizon is far outside and not at infinity.

@@ -1,4 +1,4 @@
-"""Where weights are kept, and what to do where they are missing."""
+"""Files of the trained weights, and the command that makes them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def weights(name: str) -> Path:
 
 
 def missing(names: tuple[str, ...]) -> str | None:
-    """What to do before these nets can be asked; None where nothing is."""
+    """Return how to train the nets that have no weights, in words; None if all have them."""
     absent = [name for name in names if not weights(name).exists()]
     if not absent:
         return None

@@ -39,7 +39,7 @@ Picture = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class Window:
-    """Where the window lies: below the camera `foot` (2,), unit vectors `right` and `ahead` (2,), metres a pixel."""
+    """Place of the window: below the camera `foot` (2,), unit vectors `right` and `ahead` (2,), metres a pixel."""
 
     foot: Array
     right: Array
@@ -54,13 +54,13 @@ class Window:
         return cls(pose.position[:2], right, ahead, HEIGHTS_PER_PIXEL * float(pose.position[2]))
 
     def ground(self, pixels: Array) -> Array:
-        """Where pixels (..., 2) of the window are on the ground (..., 2)."""
+        """Map pixels (..., 2) of the window to the ground (..., 2)."""
         across = (pixels[..., :1] - (SIZE[0] - 1) / 2) * self.pixel_m
         along = (SIZE[1] - 1 - pixels[..., 1:] + NEAREST_HEIGHTS / HEIGHTS_PER_PIXEL) * self.pixel_m
         return self.foot + across * self.right + along * self.ahead
 
     def pixels(self, ground: Array) -> Array:
-        """Where ground points (..., 2) are in the window (..., 2)."""
+        """Map ground points (..., 2) to pixels of the window (..., 2)."""
         across = (ground - self.foot) @ self.right / self.pixel_m
         along = (ground - self.foot) @ self.ahead / self.pixel_m
         rows = SIZE[1] - 1 + NEAREST_HEIGHTS / HEIGHTS_PER_PIXEL - along
@@ -109,7 +109,7 @@ def shown(finer: NDArray[np.float32]) -> Picture:
 
 
 def placed(points: Array, by: Pose, seen_from: Pose, pitch: Field) -> Array:
-    """Where on the roof (N, 2) the pose `by` puts what is seen of points (N, 3) from another one, by the same lens.
+    """Return where on the roof (N, 2) the pose `by` puts what another pose sees of points (N, 3), by one lens.
 
     NaN for what is behind either, or put above the horizon.
     """

@@ -1,4 +1,4 @@
-"""What happens to a camera and its field over the nights: the real camera of each night, and the paint before it."""
+"""Changes of a camera and its field over the nights: the real camera of each night, and the paint before it."""
 
 from __future__ import annotations
 

@@ -152,7 +152,7 @@ def _camera(view: str, number: int) -> Camera:
 
 
 def _picture(view: str, number: int, light: str) -> Frame:
-    """What a camera sees in some light, without any noise."""
+    """Render the picture of a camera in some light, without any noise."""
     drawn = Conditions.named("cloud", np.random.default_rng([31, list(FOCAL_LENGTHS).index(view), number]))
     conditions = replace(
         seen_well(drawn, swell=1.0, wobble=1.0), noise=0.0, jpeg_quality=100, light=light, moment=LIGHTS.index(light)
@@ -168,7 +168,7 @@ def _tonight(camera: Camera, longer: float, rng: np.random.Generator) -> Camera:
 
 
 def _seen_through(picture: Frame, camera: Camera, real: Camera) -> Frame:
-    """What another camera at the same place sees, by the picture of one."""
+    """Warp the picture of one camera to another camera at the same place."""
     width, height = camera.intrinsics.size
     columns, rows = (STEP_PX * (np.arange(-1, side // STEP_PX + 1) + 0.5) - 0.5 for side in (width, height))
     there = real.rays(np.stack(np.meshgrid(columns, rows), axis=-1))
@@ -196,7 +196,7 @@ def _calibrated(running: Service, venue: str, frame: bytes) -> dict:
 
 
 def _job(result: dict, real: Camera, longer: float) -> RenderedJob:
-    """What a result says beside the real camera, whose focal length is `longer` than at first by a part of it."""
+    """Compare a result with the real camera, whose focal length is `longer` than at first by a part of it."""
     camera = result["cameras"][0]
     refined, change = camera["refined"], camera["lens_change"]
     return RenderedJob(

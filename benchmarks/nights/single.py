@@ -39,12 +39,12 @@ class Job:
 
     @property
     def accepted(self) -> bool:
-        """Whether it replaced the stored pose."""
+        """True if the answer replaced the stored pose."""
         return self.because is None
 
     @property
     def wrong(self) -> bool:
-        """Whether it was accepted, and farther off than it says, or than anything may be."""
+        """True if it was accepted, and is farther off than three of its sigmas, or than 30 cm."""
         beyond = self.error_m > max(SIGMAS * self.sigma_m, LEAST_WRONG_M)
         return self.accepted and (beyond or self.error_m > FARTHEST_M)
 

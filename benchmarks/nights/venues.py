@@ -25,8 +25,8 @@ WIND_M, WIND_DEG = 0.01, 0.03
 
 @dataclass(frozen=True)
 class Night:
-    """Of all cameras of a venue: errors of the answer and of the refined poses, m, the latter over their sigmas, the
-    stitch error of the answer (1 px = 10 cm), and how many were accepted."""
+    """Figures of all cameras of a venue: errors of the answer and of the refined poses, m, the latter over sigma,
+    the stitch error of the answer (1 px = 10 cm), and how many were accepted."""
 
     error_m: list[float]
     refined_m: list[float]

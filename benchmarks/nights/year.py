@@ -75,11 +75,11 @@ class Change:
     aside_m: float = 0.0
 
     def share(self, day: int) -> float:
-        """How much of it has happened, 0..1."""
+        """Return the share of it that has happened by a day, 0..1."""
         return float(np.clip((day - self.day) / self.days, 0, 1)) if self.days else float(day >= self.day)
 
     def is_named(self, said: Said) -> bool:
-        """Whether this tells it."""
+        """True if this names the change."""
         named = any(words in str(said) for words in self.names)
         return named and said.about.startswith(self.camera) and said.kind != "alarm.ended"
 
@@ -105,7 +105,7 @@ CHANGES = (
 
 @dataclass(frozen=True)
 class Hand:
-    """What a person does to the service on a day, before that night's job: it returns what came of it."""
+    """An act of a person on a day, before that night's job; it returns what came of it."""
 
     day: int
     do: Callable[[Year, Mapping[str, Camera]], str]
@@ -238,7 +238,7 @@ class Answer:
 
     @property
     def is_wrong(self) -> bool:
-        """Whether it is farther off than it says."""
+        """True if the error is beyond three sigma."""
         return self.error_m > max(SIGMAS * self.sigma_m, LEAST_WRONG_M)
 
     def __str__(self) -> str:
@@ -291,7 +291,7 @@ def _nights(year: Year, truth: Truth) -> Iterator[Night]:
 
 
 def _said(year: Year, result: Result, told: int) -> list[Said]:
-    """All that a person can read on that day; `told`: how many alarms were told before."""
+    """Return all that a person can read on that day; `told`: the number of earlier alarms."""
     trends = [year.home.trends.of(year.venue, camera.id) for camera in result.cameras]
     return [
         *(said for camera in result.cameras for said in _said_of(camera)),
@@ -357,7 +357,7 @@ def _counts(nights: Sequence[Night]) -> Iterator[str]:
 
 
 def _named(change: Change, nights: Sequence[Night]) -> str:
-    """When it was named first, by something that had not been said the night before."""
+    """Return the row of a change: when it was named first, by something that had not been said the night before."""
     eve = [night for night in nights if night.day < change.day][-1]
     since = [night for night in nights if night.day >= change.day]
     known = {(said.kind, said.about) for said in eve.said}

@@ -107,7 +107,7 @@ def _submit_real(running: Service, number: int) -> str:
 
 
 def _followed(running: Service, job: str) -> dict:
-    """As a production tool does: polls with the last ETag, lists, looks whether all is ready."""
+    """Follow a job as a production tool does: polls with the last ETag, lists, reads metrics."""
     tag = ""
 
     def ended() -> dict | None:
@@ -151,7 +151,7 @@ def _sample(running: Service, worker: int) -> Sample:
 
 
 def _size_mb(path: Path) -> float:
-    """Nothing, if it was deleted a moment ago."""
+    """Return the size of a file; 0 if it was deleted a moment ago."""
     try:
         return path.stat().st_size / 1e6
     except FileNotFoundError:

@@ -57,7 +57,7 @@ HEAD = (
 
 @dataclass(frozen=True)
 class Day:
-    """What was measured at its end; `folders_per_s`: with the pauses between rounds, none where nothing was deleted."""
+    """Figures at the end of a day; `folders_per_s`: with the pauses between rounds, None where nothing was deleted."""
 
     jobs: int
     folders: int
@@ -76,7 +76,7 @@ class Counted(ExpiryRepository):
     gone = 0
 
     def forget_leftovers(self, folders: Collection[str]) -> None:
-        """These."""
+        """Count the folders and forget them."""
         super().forget_leftovers(folders)
         self.gone += len(folders)
 
@@ -212,7 +212,7 @@ def _ms(look: Callable[[], object]) -> float:
 
 
 def _database_kb(home: ApplicationState) -> float:
-    """Of ours and of the queue's, with what was deleted and is not yet used again."""
+    """Return the size of the database, with the queue's tables and with room that deleted rows left."""
     if home.engine.dialect.name == "sqlite":
         return sum(path.stat().st_size for path in home.settings.data.glob("esc.sqlite*")) / 1e3
     with home.engine.connect() as connection:

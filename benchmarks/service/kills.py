@@ -49,7 +49,7 @@ SUBMISSION_S, JOB_S = 0.1, 1.5
 
 @dataclass
 class Tally:
-    """Of the rounds of one victim in one home: jobs, those promised before the kill, attempts, seconds to the end."""
+    """Totals of one victim in one home: jobs, those promised before the kill, attempts, seconds to the end."""
 
     jobs: int = 0
     promised: int = 0

@@ -1,4 +1,4 @@
-"""What lists and pages cost when there are many jobs."""
+"""Cost of lists and pages when there are many jobs."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ POLLERS_CORE = max(os.sched_getaffinity(0))
 
 @dataclass(frozen=True)
 class Polled:
-    """What the pollers saw during one job, and how much of a core the API and they used for it."""
+    """Answers that the pollers got during one job, and the cores that the API and they used."""
 
     per_s: float
     milliseconds: np.ndarray

@@ -1,4 +1,4 @@
-"""Where the benchmarks play: both homes, and services in them that end with their block."""
+"""Both homes, and services in them that end with their block."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ EMBEDDED, SERVERS = "SQLite, folder", "PostgreSQL, S3"
 
 @contextmanager
 def homes(postgres_options: Sequence[str] = HASTY) -> Iterator[dict[str, Home]]:
-    """Both."""
+    """Yield both homes by their names; PostgreSQL runs with these options."""
     binaries = postgres_binaries()
     if binaries is None:
         raise SystemExit("PostgreSQL is needed (Debian: apt-get install postgresql)")

@@ -1,4 +1,4 @@
-"""Where the real pair is missing, its tests are skipped."""
+"""The real pair; its tests are skipped where it is missing."""
 
 import pytest
 

@@ -23,7 +23,7 @@ EXCHANGED = (3, 10)
 
 
 def commands() -> list[str]:
-    """What the page tells to type, step by step: to find the cameras, and then all that goes with a board."""
+    """Return the commands of the page, step by step: to find the cameras, and then all that goes with a board."""
     return re.findall(r"^```sh\n(.*?)^```$", DOCUMENT.read_text(), re.MULTILINE | re.DOTALL)
 
 
