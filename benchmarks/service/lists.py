@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 import sqlalchemy as sa
 
-from benchmarks.service.stage import homes, spread
+from benchmarks.printing import spread
+from benchmarks.service.stage import homes
 from service.schemas.options import Options
 from service.schemas.venue import VenueIn
 from service.store import tables
