@@ -78,7 +78,8 @@ def _fill(store: Repositories, jobs: int) -> None:
 
     With their documents ten million would need 90 GB. No list reads those of jobs that it does not show.
     """
-    whole = [range(max(end - WHOLE, 0), end) for end in (jobs // 2 + 1, jobs)]
+    middle = jobs // 2 + 1
+    whole = [range(max(middle - WHOLE, 0), middle), range(max(jobs - WHOLE, middle), jobs)]
     with store.engine.begin() as connection:
         for first in range(0, jobs, LEAN_BATCH):
             connection.execute(_lean(first, min(first + LEAN_BATCH, jobs), whole))
