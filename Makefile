@@ -5,17 +5,23 @@ BIN := $(VENV)/bin
 
 .PHONY: setup demo test test-fast test-long format check wheel bench bench-find bench-knocked bench-real bench-cost bench-fields bench-segmentation bench-truth bench-service bench-faults bench-hostile bench-rate bench-versions bench-video bench-follow bench-live bench-learned train lock clean
 
-setup: $(VENV)/.installed
-
-$(VENV)/.installed: requirements.lock pyproject.toml
+# What runs, without what tests, checks and clips need on top: a third of the size. Compiled where it is first imported.
+$(VENV)/.runtime: docker/requirements.lock pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 14) and "ESC needs Python 3.11, 3.12 or 3.13; try: make PYTHON=python3.12 " or 0)'
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
-	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+	$(BIN)/pip install --quiet --disable-pip-version-check --no-compile --require-hashes -r docker/requirements.lock
+	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --editable .
 	touch $@
 
-demo: setup
-	$(BIN)/python -m tests.demo
+demo: $(VENV)/.runtime
+	PYTHONDONTWRITEBYTECODE= $(BIN)/python -m demo
+
+setup: $(VENV)/.installed
+
+$(VENV)/.installed: $(VENV)/.runtime requirements.lock
+	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
+	$(BIN)/python -m compileall -qq $(VENV)/lib || true
+	touch $@
 
 # Compiled files are kept even where the machine says not to: each of hundreds of processes would compile them anew.
 PYTEST := PYTHONDONTWRITEBYTECODE= $(BIN)/pytest --numprocesses=auto --dist=worksteal
@@ -41,7 +47,7 @@ check: setup
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
-	$(BIN)/mypy --config-file tests/benchmarks/mypy.ini
+	$(BIN)/mypy --config-file benchmarks/mypy.ini
 	$(BIN)/lint-imports
 	$(BIN)/deptry .
 	$(BIN)/python -m tests.openapi
@@ -51,77 +57,74 @@ wheel: setup
 	rm -rf build/lib build/bdist.*
 	$(BIN)/pip wheel --quiet --disable-pip-version-check --no-deps --no-build-isolation --wheel-dir dist . ./client
 
+# One BLAS thread, as the worker sets it.
+BENCH := env OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks
+
 bench-real: setup
-	$(BIN)/python -m tests.benchmarks.real_pair
-	$(BIN)/python -m tests.benchmarks.seam
+	$(BIN)/python -m benchmarks.real_pair
+	$(BIN)/python -m benchmarks.seam
 
-# One BLAS thread, as the worker sets it.
 bench-fields: setup
-	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.fields
+	$(BENCH).fields
 
-# One BLAS thread, as the worker sets it.
 bench-find: setup
-	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.find
+	$(BENCH).find
 
-# One BLAS thread, as the worker sets it.
 bench-knocked: setup
-	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.knocked
+	$(BENCH).knocked
 
 # Needs GStreamer's RTSP server, as CONTRIBUTING.md says.
 bench-live: setup
-	$(BIN)/python -m tests.benchmarks.live
+	$(BIN)/python -m benchmarks.live
 
 bench-segmentation: $(VENV)/.train
-	$(BIN)/python -m tests.benchmarks.segmentation
+	$(BIN)/python -m benchmarks.segmentation
 
 bench-service: setup
-	$(BIN)/python -m tests.benchmarks.service
+	$(BIN)/python -m benchmarks.service
 
 # SECONDS: how long each fault lasts.
 SECONDS ?= 20
 bench-faults: setup
-	$(BIN)/python -m tests.benchmarks.faults --seconds $(SECONDS)
+	$(BIN)/python -m benchmarks.faults --seconds $(SECONDS)
 
 bench-hostile: setup
-	$(BIN)/python -m tests.benchmarks.hostile
+	$(BIN)/python -m benchmarks.hostile
 
 $(VENV)/.bench: $(VENV)/.installed
 	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[bench]'
 	touch $@
 
-# One BLAS thread, as the worker sets it.
 bench: $(VENV)/.bench
-	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.accuracy
+	$(BENCH).accuracy
 
 # What `make bench` compares with and has to be trained, once: six hours of one core, less with a GPU (see --help).
 bench-learned: $(VENV)/.bench
-	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 nice -n 19 $(BIN)/python -m tests.benchmarks.learned
+	nice -n 19 $(BENCH).learned
 
-# One BLAS thread, as the worker sets it.
 # ONLY: some of its parts, for instance `make bench-truth ONLY=nights`.
-ONLY ?= lenses gate drifts nights twice
+ONLY ?= lenses gate nights twice
 bench-truth: $(VENV)/.bench $(VENV)/.train
-	for part in $(ONLY); do OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.$$part || exit 1; done
+	for part in $(ONLY); do $(BENCH).$$part || exit 1; done
 
 # BEFORE: a clone of an earlier release with its .venv; `git worktree add ../esc-before v0.1.0 && make -C ../esc-before setup`.
 bench-cost: setup
-	$(BIN)/python -m tests.benchmarks.cost $(if $(BEFORE),--before $(BEFORE))
+	$(BIN)/python -m benchmarks.cost $(if $(BEFORE),--before $(BEFORE))
 
 bench-versions: setup
-	$(BIN)/python -m tests.benchmarks.versions
+	$(BIN)/python -m benchmarks.versions
 
 bench-rate: setup
-	$(BIN)/python -m tests.benchmarks.rate
+	$(BIN)/python -m benchmarks.rate
 
-# One BLAS thread, as the worker sets it.
 bench-follow: setup
-	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.shaking
-	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.shaking --lens usual
-	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.shaking --size 4k --seconds 4
-	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.tracking_cost $(if $(BEFORE),--before $(BEFORE))
+	$(BENCH).shaking
+	$(BENCH).shaking --lens usual
+	$(BENCH).shaking --size 4k --seconds 4
+	$(BENCH).tracking_cost $(if $(BEFORE),--before $(BEFORE))
 
 bench-video: setup
-	$(BIN)/python -m tests.benchmarks.stitch_video
+	$(BIN)/python -m benchmarks.stitch_video
 
 $(VENV)/.train: $(VENV)/.installed
 	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[train]'

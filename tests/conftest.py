@@ -16,8 +16,8 @@ import pytest
 import structlog
 
 from service.store.database import connect
-from tests.homes import Embedded, Servers, postgres_binaries, postgres_server, s3_server
-from tests.worker.stock import Stock
+from testbed.homes import Embedded, Servers, postgres_binaries, postgres_server, s3_server
+from testbed.stock import Stock
 
 # How long an example takes says how busy the machine is, not whether the property holds.
 hypothesis.settings.register_profile("esc", deadline=None)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tests.worker.calibration.synthetic import BARREL, camera
+from testbed.synthetic import BARREL, camera
 from worker.calibration.geometry.camera import Camera, Pose
 
 

@@ -13,12 +13,10 @@ from service.schemas.results import CameraResult, Result
 from service.settings import setting_names
 from service.variable_names import unread
 from tests import settings_page
-from tests.benchmarks import sizing
 from tests.e2e.commands import all_commands
 
 ROOT = Path(__file__).parents[1]
 OPERATIONS = ROOT / "docker" / "README.md"
-SIZING = ROOT / "docs" / "sizing.md"
 SETTINGS = ROOT / "docs" / "settings.md"
 GLOSSARY = ROOT / "docs" / "glossary.md"
 INDEX = ROOT / "docs" / "README.md"
@@ -123,10 +121,6 @@ def test_no_document_and_no_file_of_operators_speaks_of_a_variable_that_a_start_
     for document in [*OF_TODAY, *files, ROOT / ".ci" / "run"]:
         spoken = set(re.findall(r"\bESC_[A-Z_]+[A-Z]\b", document.read_text()))
         assert unread(spoken, setting_names()) == [], document
-
-
-def test_the_figures_of_the_sizing_page_are_those_that_its_command_prints():
-    assert sizing.tables() in SIZING.read_text()
 
 
 def test_the_index_lists_every_page():

@@ -20,7 +20,7 @@ from service.formats.lens import NumberedCamera
 from service.schemas.field import FieldOfPlay
 from service.schemas.programs.stitching import StitchRequest
 from service.schemas.view import ViewChoice
-from tests.worker.calibration.synthetic import BARREL, PITCH, camera, ground_behind, paint_frame, pair
+from testbed.synthetic import BARREL, PITCH, camera, ground_behind, paint_frame, pair
 from worker.calibration.stitching.panorama import panorama
 from worker.calibration.stitching.views import ViewChoice as EngineChoice
 from worker.calibration.stitching.views import chosen_view

@@ -9,7 +9,7 @@ import sqlalchemy as sa
 from service.schemas.results import Sigma
 from service.schemas.trend import Displacement
 from service.store import tables
-from tests.worker.stock import Stock, result
+from testbed.stock import Stock, result
 
 SIGMA_M, SIGMA_FOCAL = 0.01, 0.0004
 # Metres at the far touchline for a focal length that is longer by all of it.

@@ -5,11 +5,11 @@ import json
 import numpy as np
 import pytest
 
+from benchmarks.fields.engine import Engine
+from benchmarks.fields.judging import caught, far_off, near, outcome, overconfident, reason, reasons, share
+from benchmarks.fields.rendered import GROUNDS, LARGE_M, random_camera, usual_field
+from benchmarks.rows import Rows
 from fields.template import NAMES
-from tests.benchmarks.fields.engine import Engine
-from tests.benchmarks.fields.judging import caught, far_off, near, outcome, overconfident, reason, reasons, share
-from tests.benchmarks.fields.rendered import GROUNDS, LARGE_M, random_camera, usual_field
-from tests.benchmarks.rows import Rows
 from worker.calibration.geometry.camera import inside
 
 

@@ -7,13 +7,13 @@ import cv2
 import numpy as np
 import pytest
 
-from tests.benchmarks.learned import weights
-from tests.benchmarks.learned.ecc import aligned
-from tests.benchmarks.learned.pairs import Ground, Pairs, drawn_pair, random_ground
-from tests.benchmarks.learned.pose import corrected, with_displaced
-from tests.benchmarks.learned.window import QUAD, SIZE, Window, placed
-from tests.benchmarks.scenes import LAYOUTS, placed_cameras, started
-from tests.benchmarks.truth import apart
+from benchmarks.learned import weights
+from benchmarks.learned.ecc import aligned
+from benchmarks.learned.pairs import Ground, Pairs, drawn_pair, random_ground
+from benchmarks.learned.pose import corrected, with_displaced
+from benchmarks.learned.window import QUAD, SIZE, Window, placed
+from benchmarks.scenes import LAYOUTS, placed_cameras, started
+from benchmarks.truth import apart
 
 
 @pytest.fixture
@@ -112,6 +112,6 @@ def test_where_nothing_is_seen_ecc_leaves_the_pose_as_it_was(ground, camera):
 
 def test_missing_weights_are_told_with_the_command_that_makes_them(tmp_path, monkeypatch):
     monkeypatch.setattr(weights, "WEIGHTS", tmp_path)
-    assert "python -m tests.benchmarks.learned --nets dhn otle" in weights.missing(("dhn", "otle"))
+    assert "python -m benchmarks.learned --nets dhn otle" in weights.missing(("dhn", "otle"))
     weights.weights("dhn").touch()
     assert weights.missing(("dhn",)) is None

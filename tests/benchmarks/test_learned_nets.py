@@ -8,15 +8,15 @@ import pytest
 
 torch = pytest.importorskip("torch", reason="needs the extra `bench`: pip install '.[bench]'")
 
-from tests.benchmarks.learned import weights  # noqa: E402
-from tests.benchmarks.learned.answers import displacement_by  # noqa: E402
-from tests.benchmarks.learned.nets import NETS  # noqa: E402
-from tests.benchmarks.learned.otle import candidate_errors  # noqa: E402
-from tests.benchmarks.learned.pairs import Pairs  # noqa: E402
-from tests.benchmarks.learned.pool import Drawn, Pool, batch_of  # noqa: E402
-from tests.benchmarks.learned.training import Training, rate_at, train  # noqa: E402
-from tests.benchmarks.learned.warp import homographies, moved, scaled, warped  # noqa: E402
-from tests.benchmarks.learned.window import QUAD, SIZE  # noqa: E402
+from benchmarks.learned import weights  # noqa: E402
+from benchmarks.learned.answers import displacement_by  # noqa: E402
+from benchmarks.learned.nets import NETS  # noqa: E402
+from benchmarks.learned.otle import candidate_errors  # noqa: E402
+from benchmarks.learned.pairs import Pairs  # noqa: E402
+from benchmarks.learned.pool import Drawn, Pool, batch_of  # noqa: E402
+from benchmarks.learned.training import Training, rate_at, train  # noqa: E402
+from benchmarks.learned.warp import homographies, moved, scaled, warped  # noqa: E402
+from benchmarks.learned.window import QUAD, SIZE  # noqa: E402
 
 pytestmark = pytest.mark.train
 CPU = torch.device("cpu")
@@ -58,8 +58,8 @@ def test_the_warp_says_which_way_its_points_should_move(pairs):
 
 
 def test_a_mirrored_pair_is_a_pair(pairs, monkeypatch):
-    monkeypatch.setattr("tests.benchmarks.learned.pool.Pairs", lambda *_: iter(pairs[:1] * 32))
-    monkeypatch.setattr("tests.benchmarks.learned.pool.FIRST", 1)
+    monkeypatch.setattr("benchmarks.learned.pool.Pairs", lambda *_: iter(pairs[:1] * 32))
+    monkeypatch.setattr("benchmarks.learned.pool.FIRST", 1)
     batch = Pool(7, CPU, kept=4).batch(16)
     mirrored = (batch.offsets != batch.offsets[0]).any(dim=-1).any(dim=-1)
     assert mirrored.any()
@@ -77,8 +77,8 @@ def test_workers_draw_pairs_of_their_own():
 @pytest.mark.parametrize("name", NETS)
 def test_every_net_learns_and_goes_on_where_it_stopped(name, tmp_path, monkeypatch, pairs, capsys):
     monkeypatch.setattr(weights, "WEIGHTS", tmp_path)
-    monkeypatch.setattr("tests.benchmarks.learned.training.VALIDATED_BY", 2)
-    monkeypatch.setattr("tests.benchmarks.learned.pool.FIRST", 1)
+    monkeypatch.setattr("benchmarks.learned.training.VALIDATED_BY", 2)
+    monkeypatch.setattr("benchmarks.learned.pool.FIRST", 1)
     monkeypatch.setattr(NETS[name], "tried_steps", (1,))
     torch.save({"net": NETS["dhn"]().state_dict()}, weights.weights("dhn"))
     if name == "dhn":

@@ -3,8 +3,8 @@
 import socket
 import threading
 
+from testbed.running import wait_for
 from tests.dialects.stub_camera import StubCamera
-from tests.e2e.running import wait_for
 
 
 def test_a_stub_that_is_closed_leaves_no_thread():

@@ -10,7 +10,7 @@ from unittest.mock import patch
 
 from service.cli.main import COMMANDS, load_command, main
 from service.observability import logs
-from tests.e2e import warm
+from testbed import warm
 
 
 def esc_here(folder: Path, *arguments: str, **environment: str) -> CompletedProcess:

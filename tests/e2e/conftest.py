@@ -12,11 +12,11 @@ from functools import partial
 import pytest
 
 from service.settings import MODEL_BESIDE_THE_CODE
-from tests import disks
-from tests.disks import may_mount
+from testbed import disks
+from testbed.disks import may_mount
+from testbed.homes import environment
+from testbed.running import Service, png
 from tests.e2e.commands import esc_here
-from tests.e2e.running import Service, png
-from tests.homes import environment
 
 # Cameras of the tests are servers on this machine. One that sends without end is to be found out soon, one that a busy
 # machine delays is to be waited for.

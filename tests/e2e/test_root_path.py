@@ -5,9 +5,9 @@ import shutil
 import pytest
 
 from service.client import Client
-from tests.e2e.routes.test_following import Stream
-from tests.e2e.running import Service, keys_in, png, venue
-from tests.e2e.test_proxies import NAME, Caddy, Nginx
+from testbed.running import Service, keys_in, png, venue
+from tests.e2e.proxies import NAME, Caddy, Nginx
+from tests.e2e.routes.event_stream import Stream
 
 ROOT = "/truck/esc"
 

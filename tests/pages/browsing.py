@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from playwright.sync_api import Browser, BrowserContext, Locator, Page, Route, expect, sync_playwright
 
-from tests.e2e.running import wait_for
+from testbed.running import wait_for
 
 ARGUMENTS = [
     "--headless",

@@ -9,11 +9,11 @@ from functools import cache
 import pytest
 
 from service.settings import MODEL_BESIDE_THE_CODE
-from tests.e2e.running import Service, ready, wait_for
+from testbed.running import Service, ready, wait_for
+from testbed.stock import Stock
 from tests.once import made_once
 from tests.pages import newcomer
 from tests.pages.browsing import browser_at, chromium, person, tab
-from tests.worker.stock import Stock
 
 # Worker and engine load libraries first.
 STARTING_S = 120

@@ -9,8 +9,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from tests.e2e.running import wait_for
-from tests.ports import free_port
+from testbed.ports import free_port
+from testbed.running import wait_for
 
 STARTING_S = 60
 # By which WebDriver says that a value is an element of the page.

@@ -8,9 +8,9 @@ import cv2
 import numpy as np
 from playwright.sync_api import FilePayload, Page, expect
 
+import demo
 from service.schemas.geometry import Pose
 from service.schemas.venue import VenueIn
-from tests import demo
 from worker.calibration.geometry.camera import Camera
 from worker.jobs.from_schemas import camera_of, pitch_of
 

@@ -13,10 +13,10 @@ import cv2
 import numpy as np
 from playwright.sync_api import Browser, Page
 
+from demo.__main__ import service
 from service.settings import Settings
 from service.store.database import connect, writing
-from tests.demo.__main__ import service
-from tests.e2e.running import venue
+from testbed.running import venue
 from tests.pages import newcomer
 from tests.pages.browsing import browser_at, chromium, person, tab
 from tests.pages.stocked import LIVE, calibrations, live_minutes

@@ -12,8 +12,8 @@ from service.store import tables
 from service.store.ids import new_id
 from service.store.statistics.venue_quality import update_quality
 from service.store.statistics.venue_summary import IN_CURVE
-from tests.e2e import running
-from tests.worker.stock import result
+from testbed import running
+from testbed.stock import result
 
 
 def calibrations(connection: sa.Connection, venue_id: str, count: int) -> None:

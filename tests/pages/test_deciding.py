@@ -7,7 +7,7 @@ import sqlalchemy as sa
 from playwright.sync_api import expect
 
 from service.store import tables
-from tests.e2e.running import venue
+from testbed.running import venue
 from tests.pages.browsing import press_and_confirm
 from tests.pages.reading import shown_at, words_of
 

@@ -10,7 +10,7 @@ from playwright.sync_api import expect
 from service.pages import documents
 from service.pages.problem_pages import DOCUMENT_NAME, wants_page
 from service.schemas.problems import PROBLEM_TYPES, REFUSAL_REASONS
-from tests.e2e.running import Service, keys_in
+from testbed.running import Service, keys_in
 from tests.pages.browsing import in_each_scheme, keep_one_path, look, wait_until
 from tests.pages.reading import CHROME, shown_at, words_of
 

@@ -7,7 +7,7 @@ from playwright.sync_api import expect
 
 from service.schemas.names import id_like
 from service.store.jobs.queries import ONE
-from tests.e2e.running import png, upload
+from testbed.running import png, upload
 from tests.pages import browsing
 from tests.service.routes.test_find import depth, find, forget_frames, found, site
 

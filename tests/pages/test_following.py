@@ -6,9 +6,9 @@ import time
 import pytest
 from playwright.sync_api import expect
 
-from tests.e2e.running import Service, venue
+from testbed.running import Service, venue
+from testbed.stock import Stock
 from tests.pages.browsing import in_each_scheme, list_from, wait_until
-from tests.worker.stock import Stock
 
 # While a service is away, a browser says so at each try; and of what it was loading when the service was killed.
 AWAY = (

@@ -3,7 +3,7 @@
 import pytest
 from playwright.sync_api import expect
 
-from tests.e2e.running import png
+from testbed.running import png
 from tests.pages.browsing import grave, look
 
 

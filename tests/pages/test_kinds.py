@@ -10,7 +10,7 @@ from service.schemas.results import CoverageResult, IntrinsicsResult, LocateResu
 from service.schemas.venue import VenueIn
 from service.store import tables
 from service.store.ids import new_id
-from tests.e2e.running import venue
+from testbed.running import venue
 
 CAMERA = VenueIn.model_validate(venue("kinds")).to_venue().cameras[0]
 POINT = PointResult(world="centre spot", residual_px=1.5, doubted=False, exchanged_with=None, looks_like=None)

@@ -5,7 +5,7 @@ import itertools
 import pytest
 from playwright.sync_api import expect
 
-from tests.e2e.running import venue
+from testbed.running import venue
 from tests.pages.browsing import tab, wait_until
 from tests.pages.newcomer import describe_a_camera
 

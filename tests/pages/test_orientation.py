@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import expect
 
-from tests.e2e.running import SIZE, wait_for
+from testbed.running import SIZE, wait_for
 from tests.pages import newcomer
 from tests.pages.browsing import look
 from tests.pages.firefox import firefox, firefox_at

@@ -5,8 +5,8 @@ import re
 import pytest
 from playwright.sync_api import expect
 
-from tests.e2e import running
-from tests.e2e.running import SIZE, Service, png, wait_for
+from testbed import running
+from testbed.running import SIZE, Service, png, wait_for
 from tests.pages.browsing import differs, grave, list_from, look, press_and_confirm, tab, wait_until
 from tests.pages.stocked import calibrations
 

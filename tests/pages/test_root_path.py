@@ -6,8 +6,8 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from tests.e2e.running import Service, png, venue
-from tests.e2e.test_proxies import Nginx
+from testbed.running import Service, png, venue
+from tests.e2e.proxies import Nginx
 from tests.pages.browsing import PATIENCE_MS, keep_one_path, tab
 
 ROOT = "/esc"

@@ -5,8 +5,8 @@ import re
 import pytest
 from playwright.sync_api import expect
 
-from tests.e2e.intake.cameras import NetworkCamera
-from tests.e2e.running import Service
+from testbed.network_cameras import NetworkCamera
+from testbed.running import Service
 from tests.pages.browsing import grave, press_and_confirm
 
 ZONE = "Asia/Tokyo"

@@ -5,7 +5,7 @@ import pytest
 from playwright.sync_api import expect
 
 from service.pages.page_rendering import local_target
-from tests.e2e.running import Service, keys_in, venue, wait_for
+from testbed.running import Service, keys_in, venue, wait_for
 from tests.pages.browsing import grave
 
 REFUSED = ("401", "403")

@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.e2e.running import wait_for
+from testbed.running import wait_for
 from tests.pages.stocked import calibrations
 
 FIRST_PAINT_MS = 1000

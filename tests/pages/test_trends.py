@@ -12,9 +12,9 @@ from service.pages.page_rendering import templates
 from service.pages.trend_charts import trend_charts
 from service.schemas.geometry import Moved
 from service.schemas.trend import Chart, Trend, TrendPoint
+from testbed.stock import Stock
 from tests.pages.browsing import in_each_scheme
 from tests.trending import nights, noisy
-from tests.worker.stock import Stock
 
 COLOUR_OF = """
 name => {

@@ -1,8 +1,8 @@
-"""Where the real pair is missing, its tests are skipped."""
+"""The real pair; its tests are skipped where it is missing."""
 
 import pytest
 
-from tests.real.pair import FOLDER, RealPair
+from testbed.real_pair import FOLDER, RealPair
 
 
 @pytest.fixture(scope="session")

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from testbed.real_pair import FOLDER
 from tests.once import made_once
-from tests.real.pair import FOLDER
 from worker.calibration.geometry.camera import Camera, Pose
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.lens import Intrinsics
@@ -23,7 +23,7 @@ EXCHANGED = (3, 10)
 
 
 def commands() -> list[str]:
-    """What the page tells to type, step by step: to find the cameras, and then all that goes with a board."""
+    """Return the commands of the page, step by step: to find the cameras, and then all that goes with a board."""
     return re.findall(r"^```sh\n(.*?)^```$", DOCUMENT.read_text(), re.MULTILINE | re.DOTALL)
 
 

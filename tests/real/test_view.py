@@ -8,8 +8,8 @@ import pytest
 
 from service.schemas.field import FieldOfPlay
 from service.schemas.venue import Camera
-from tests.real.pair import FOLDER
-from tests.worker.calibration.detection import spoiling
+from testbed import spoiling
+from testbed.real_pair import FOLDER
 from worker.calibration.detection.view_condition import look_at
 from worker.jobs.from_schemas import camera_of, pitch_of
 

@@ -2,8 +2,8 @@
 
 import pytest
 
+from testbed.released import Release, release_commit, worker_beside
 from tests.e2e.conftest import services_of_ones_own
-from tests.released import Release, release_commit, worker_beside
 
 
 @pytest.fixture(scope="session")

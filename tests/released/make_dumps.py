@@ -12,10 +12,10 @@ from base64 import b64encode
 from contextlib import closing
 from pathlib import Path
 
+from testbed.homes import Embedded, Home, Servers, environment, postgres_binaries, postgres_server, s3_server
+from testbed.released import DUMPS, Release
+from testbed.running import Service, upload, venue, wait_for
 from tests.e2e.routes.test_live_reports import REPORT
-from tests.e2e.running import Service, upload, venue, wait_for
-from tests.homes import Embedded, Home, Servers, environment, postgres_binaries, postgres_server, s3_server
-from tests.released import DUMPS, Release
 
 SECRET = "whsec_" + b64encode(bytes(32)).decode()
 POINTS = {"points": [{"world": [x, y], "pixel": [10 * x + 5, 10 * y + 5]} for x in (0, 1) for y in (0, 1)]}

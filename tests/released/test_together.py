@@ -5,10 +5,10 @@ import signal
 
 import pytest
 
-from tests.e2e.books import settle
+from testbed.books import settle
+from testbed.homes import in_both_homes
+from testbed.running import Service, png, venue, wait_for
 from tests.e2e.commands import esc_process
-from tests.e2e.running import Service, png, venue, wait_for
-from tests.homes import in_both_homes
 
 JOBS = 6
 

@@ -4,9 +4,9 @@ import sqlalchemy as sa
 from obstore.store import from_url
 
 from service.store import tables
-from tests.e2e.running import png, wait_for
-from tests.homes import in_both_homes
-from tests.released import load_dump
+from testbed.homes import in_both_homes
+from testbed.released import load_dump
+from testbed.running import png, wait_for
 
 
 @in_both_homes

@@ -7,8 +7,8 @@ import httpx
 from service.app import create_app
 from service.schemas.job import JobError
 from service.settings import Settings
-from tests.e2e import program
-from tests.e2e.running import Service
+from testbed import program
+from testbed.running import Service
 from worker.job_files import JobFiles
 from worker.protocol import Message
 from worker.result_checks import fault_in

@@ -7,7 +7,7 @@ import shutil
 import pytest
 
 from service.settings import Settings
-from tests.e2e.running import png
+from testbed.running import png
 from tests.service.local_service import LocalService
 
 FRAMES = [(side, png()) for side in ("left", "right")]

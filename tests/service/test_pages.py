@@ -5,7 +5,7 @@ from collections import Counter
 import pytest
 import sqlalchemy as sa
 
-from tests.homes import in_both_homes
+from testbed.homes import in_both_homes
 from tests.service.local_service import LocalService
 
 

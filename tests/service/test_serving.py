@@ -13,7 +13,7 @@ from structlog.testing import capture_logs
 
 from service import serving
 from service.settings import Settings
-from tests.e2e.running import wait_for
+from testbed.running import wait_for
 
 DOCKERFILE = Path(__file__).parents[2] / "docker" / "Dockerfile"
 

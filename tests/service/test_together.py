@@ -24,10 +24,10 @@ from service.store.jobs.queries import JobPage
 from service.store.jobs.submission import Submission
 from service.store.statistics import counters
 from service.store.workers import WorkerRepository
-from tests.e2e.running import venue
-from tests.homes import in_both_homes, on_servers
+from testbed.homes import in_both_homes, on_servers
+from testbed.running import venue
+from testbed.stock import result
 from tests.problems import refused
-from tests.worker.stock import result
 
 LIMIT = 3
 SHIFTED = [0.0, -55.0, 9.0]

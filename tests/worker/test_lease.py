@@ -6,7 +6,7 @@ import pytest
 import sqlalchemy as sa
 
 from service.schemas.job import Progress
-from tests.homes import in_both_homes
+from testbed.homes import in_both_homes
 from worker import lease
 from worker.lease import JobTimeoutError, LeaseLostError, Leases
 

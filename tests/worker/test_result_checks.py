@@ -8,7 +8,7 @@ from service.schemas.geometry import Pose
 from service.schemas.options import Options
 from service.schemas.venue import VENUE_EXAMPLE, VenueIn
 from service.store.jobs.task import Task
-from tests.worker.stock import result
+from testbed.stock import result
 from worker.protocol import Message
 from worker.result_checks import fault_in
 

@@ -4,7 +4,7 @@ import schemathesis
 from schemathesis.generation import GenerationMode
 from schemathesis.openapi.checks import ContentDeserializationError, IgnoredAuth
 
-from tests.e2e.running import png
+from testbed.running import png
 
 
 @schemathesis.hook

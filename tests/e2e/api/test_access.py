@@ -13,8 +13,8 @@ from service.app import create_app
 from service.pages.page_rendering import SIGN_IN, Page
 from service.routes.contract.guarded import Guarded
 from service.settings import Settings
+from testbed.running import Service, keys_in, png, upload, venue, wait_for
 from tests.e2e.commands import esc_here, esc_process
-from tests.e2e.running import Service, keys_in, png, upload, venue, wait_for
 
 SCOPES = ("read", "calibrate", "admin")
 # What the service can do is no secret.

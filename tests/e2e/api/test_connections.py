@@ -10,7 +10,7 @@ from contextlib import ExitStack, closing, contextmanager
 import httpx
 import pytest
 
-from tests.e2e.running import Service, upload, wait_for
+from testbed.running import Service, upload, wait_for
 
 CONNECTIONS, STRANGERS = 60, 400
 # Limit of open files: its own, and those of the connections above.

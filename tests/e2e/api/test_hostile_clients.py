@@ -14,7 +14,7 @@ from pathlib import Path
 import httpx
 import pytest
 
-from tests.e2e.running import Service, png, wait_for
+from testbed.running import Service, png, wait_for
 
 STALL_S, WHOLE_S = 1, 3
 # Connections are looked at once a second, and a test machine is busy.

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.e2e.running import Service, keys_in, upload, venue
+from testbed.running import Service, keys_in, upload, venue
 
 HERE = Path(__file__).parent
 ROOT = HERE.parents[2]

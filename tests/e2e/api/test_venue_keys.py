@@ -11,8 +11,8 @@ from fastapi.routing import iter_route_contexts
 from service.app import create_app
 from service.routes.contract.guarded import Guarded
 from service.settings import Settings
+from testbed.running import Service, keys_in, upload, venue
 from tests.e2e.commands import esc_here
-from tests.e2e.running import Service, keys_in, upload, venue
 
 OURS, THEIRS = "ours", "theirs"
 # By any of these a venue that the key is not for would be known: its id, its name, its camera.

@@ -21,7 +21,7 @@ from service.schemas.find import SoughtCameraIn, SoughtSite
 from service.schemas.health import AlarmEvent, VenueAlarm
 from service.schemas.results import FindResult
 from service.schemas.venue import VenueIn
-from tests.e2e.running import DEADLINE_S, png, venue, wait_for
+from testbed.running import DEADLINE_S, png, venue, wait_for
 
 
 @pytest.fixture

@@ -15,8 +15,8 @@ from typer.main import get_command
 from service import build
 from service.cli.main import app
 from service.store.database import SCHEMA_TABLE, connect, migrate, writing
+from testbed.running import FRAMES, keys_in, png, venue, wait_for
 from tests.e2e.commands import all_commands, esc_here, esc_process
-from tests.e2e.running import FRAMES, keys_in, png, venue, wait_for
 from tests.unprivileged import drop_capabilities
 
 # An editor in which somebody changes the name, while somebody else may put another one.

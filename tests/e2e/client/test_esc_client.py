@@ -13,8 +13,8 @@ from pathlib import Path
 import pytest
 from packaging.requirements import Requirement
 
+from testbed.running import png
 from tests.e2e.later import later
-from tests.e2e.running import png
 from tests.once import made_once
 
 ROOT = Path(__file__).parents[3]

@@ -6,9 +6,9 @@ import cv2
 import numpy as np
 import pytest
 
+from testbed.rendered_pair import SIZE, cameras, frames, venue
+from testbed.running import FRAMES
 from tests.e2e.commands import esc_here
-from tests.e2e.running import FRAMES
-from tests.e2e.worker.test_real_engine import SIZE, cameras, frames, venue
 from tests.once import made_once
 
 

@@ -10,13 +10,13 @@ from subprocess import PIPE
 import numpy as np
 import pytest
 
-from tests.e2e import warm
-from tests.e2e.client.test_stitching import document
-from tests.e2e.program import TURNED
-from tests.e2e.running import venue, wait_for
-from tests.rtsp import encode, filming, has_server
+from testbed import warm
+from testbed.program import TURNED
+from testbed.rtsp import encode, filming, has_server
+from testbed.running import venue, wait_for
+from testbed.synthetic import CROWNED, pair, pair_frames
+from testbed.venue_documents import venue_document
 from tests.service.live.receiving import freed_packet, listening, opentrackio_sample, port_of
-from tests.worker.calibration.synthetic import pair, pair_frames
 from tests.worker.video.shaking import film_shaking
 
 FRAMES_PER_SECOND = 5
@@ -78,7 +78,7 @@ def test_poses_go_on_when_the_service_is_gone(start, name):
         assert number in (1, 2)
 
 
-@pytest.mark.parametrize("arguments", [["live", "tests/demo/venue.json", "--json"], ["--version"], ["--help"]])
+@pytest.mark.parametrize("arguments", [["live", "demo/venue.json", "--json"], ["--version"], ["--help"]])
 def test_a_command_whose_output_nobody_reads_any_more_ends_in_silence(arguments):
     reads, writes = os.pipe()
     os.close(reads)
@@ -98,7 +98,7 @@ def test_a_command_whose_output_nobody_reads_any_more_ends_in_silence(arguments)
 @pytest.mark.slow
 def test_a_camera_is_tracked_in_its_stream_and_of_the_other_one_the_stored_pose_is_sent(service, name, tmp_path):
     clip = film_shaking(tmp_path)["left"]
-    service.http.put(f"/venues/{name}", json=document(name, pair())).raise_for_status()
+    service.http.put(f"/venues/{name}", json=venue_document(name, CROWNED, pair())).raise_for_status()
     with live(service, name, f"left={clip}", "--json", "--rate", "5") as process:
         lines = (json.loads(line) for line in process.stdout)
         left = next(line for line in lines if line["camera"] == "left" and line["status"] == "measured")
@@ -134,7 +134,7 @@ def filmed(tmp_path_factory):
 @contextmanager
 def recovering(service, name, filmed, behaviour):
     """`esc live --recover` of cameras that have turned, by as much as the stub of the engine turns them if asked to."""
-    stored = document(name, pair()) | {"name": behaviour}
+    stored = venue_document(name, CROWNED, pair()) | {"name": behaviour}
     for camera in stored["cameras"]:
         camera["pose"]["rotation"][0] -= TURNED
     service.http.put(f"/venues/{name}", json=stored).raise_for_status()

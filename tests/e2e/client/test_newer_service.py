@@ -5,9 +5,9 @@ import json
 import pytest
 
 from service.client import Client, NotUnderstood
+from testbed.running import png, venue
 from tests.e2e.commands import esc_here
 from tests.e2e.later import later
-from tests.e2e.running import png, venue
 
 # What later versions may answer where this one has words of its own.
 NEWER_WORDS = {"verdict": "hazy", "path": "sideways", "status": "parked", "cause": "foreseen", "lens": "breathing"}

@@ -8,33 +8,14 @@ import av
 import pytest
 
 from service.schemas.venue import VenueIn
-from tests.rtsp import encode, filming, has_server, recording
-from tests.worker.calibration.synthetic import pair, pair_frames
+from testbed.rtsp import encode, filming, has_server, recording
+from testbed.synthetic import pair, pair_frames
+from testbed.venue_documents import venue_document
 from tests.worker.video.filming import LEFT, PITCH, RIGHT, cameras, film
 from tests.worker.video.shaking import COUNT, film_shaking, shaken
 from worker.video import clips as clips_of
 
 SHOWN = ("--width", "320", "--preset", "ultrafast")
-
-
-def document(name, cameras=cameras):
-    """The venue that is filmed."""
-    return {
-        "id": name,
-        "field": {"length_m": 105.0, "width_m": 68.0, "line_width_m": 0.12, "ridge": PITCH.ridge.tolist()},
-        "cameras": [
-            {
-                "id": camera.id,
-                "image_size": list(camera.intrinsics.size),
-                "intrinsics": {
-                    "matrix": camera.intrinsics.matrix.tolist(),
-                    "distortion": camera.intrinsics.distortion.tolist(),
-                },
-                "pose": {"rotation": camera.pose.rotation.tolist(), "position": camera.pose.position.tolist()},
-            }
-            for camera in cameras
-        ],
-    }
 
 
 @pytest.fixture(scope="module")
@@ -45,7 +26,7 @@ def clips(tmp_path_factory):
 
 @pytest.fixture
 def venue_file(tmp_path, name):
-    (tmp_path / "venue.json").write_text(json.dumps(document(name)))
+    (tmp_path / "venue.json").write_text(json.dumps(venue_document(name, PITCH, cameras)))
     return "venue.json"
 
 
@@ -78,7 +59,7 @@ def test_the_result_is_told_as_json(esc, venue_file, clips):
 
 
 def test_a_venue_of_the_service_is_stitched_by_its_id(service, esc, name, clips, tmp_path):
-    service.http.put(f"/venues/{name}", json=document(name)).raise_for_status()
+    service.http.put(f"/venues/{name}", json=venue_document(name, PITCH, cameras)).raise_for_status()
     options = ("--offset", "right=5f", "--projection", "birds-eye", "--height", "auto", "--rate", "12.5", "--to", "1.2")
     answer = esc("stitch", name, *clips, "-o", "above.mov", *options, *SHOWN)
     assert answer.returncode == 0, answer.stderr
@@ -90,7 +71,7 @@ def test_a_venue_of_the_service_is_stitched_by_its_id(service, esc, name, clips,
 
 
 def test_the_light_that_a_venue_keeps_is_used(esc, name, clips, tmp_path):
-    stored = document(name)
+    stored = venue_document(name, PITCH, cameras)
     stored["cameras"][0]["light"] = {"gain": [0.5, 0.5, 0.5]}
     (tmp_path / "venue.json").write_text(VenueIn.model_validate(stored).model_dump_json())
     answer = esc("stitch", "venue.json", *clips, "-o", "pano.mkv", "--offset", "right=0.2", "--to", "0.4", *SHOWN)
@@ -128,7 +109,7 @@ def shaking(tmp_path_factory):
 
 
 def test_a_shaking_rig_is_followed_and_its_poses_lie_beside_the_clip(esc, tmp_path, shaking):
-    (tmp_path / "venue.json").write_text(json.dumps(document("windy", pair())))
+    (tmp_path / "venue.json").write_text(json.dumps(venue_document("windy", PITCH, pair())))
     options = ("--offset", "right=0", "--follow", "--poses-out", "poses", "--json")
     answer = esc("stitch", "venue.json", *shaking, "-o", "pano.mp4", *options, *SHOWN)
     assert answer.returncode == 0, answer.stderr
@@ -153,7 +134,7 @@ def test_live_cameras_are_followed_and_their_view_is_published(esc, tmp_path, mi
     films = [tmp_path / "left", tmp_path / "right"]
     for film_path, phase, camera, picture in zip(films, (0.0, 1.5), pair(), pair_frames(), strict=True):
         encode(shaken(camera, picture, phase, 50), 10, 3_000_000, film_path)
-    (tmp_path / "venue.json").write_text(json.dumps(document("windy", pair())))
+    (tmp_path / "venue.json").write_text(json.dumps(venue_document("windy", PITCH, pair())))
     with filming(films, 10) as cameras, recording(tmp_path / "received.ts") as published:
         left, right = cameras.addresses
         options = ("--follow", "--rate", "10", "--to", "9", "--json", *SHOWN)

@@ -4,8 +4,8 @@ import json
 
 import pytest
 
+from testbed.running import png, venue
 from tests.e2e.commands import esc_here
-from tests.e2e.running import png, venue
 
 NO_CHOICE = "name a CAMERA, or a number of the field with --field and --job, or --found JOB"
 

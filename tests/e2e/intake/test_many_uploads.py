@@ -6,7 +6,7 @@ from pathlib import Path
 import httpx
 import pytest
 
-from tests.e2e.running import Service, png, venue
+from testbed.running import Service, png, venue
 
 UPLOADS, FRAMES = 8, 12
 # Below what a form keeps in memory unless told otherwise.

@@ -12,8 +12,8 @@ from service.intake.snapshots import STARTING_S, Snapshots
 from service.schemas.venue import VenueIn
 from service.settings import Settings
 from service.store import tables
-from tests.e2e.intake.cameras import NetworkCamera
-from tests.e2e.running import png, upload, venue, wait_for
+from testbed.network_cameras import NetworkCamera
+from testbed.running import png, upload, venue, wait_for
 
 
 @pytest.fixture(scope="module")

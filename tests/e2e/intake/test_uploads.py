@@ -13,7 +13,7 @@ import httpx
 import numpy as np
 import pytest
 
-from tests.e2e.running import SIZE, png, png_of, upload, wait_for
+from testbed.running import SIZE, png, png_of, upload, wait_for
 
 
 @pytest.fixture

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 import yaml
 
+from testbed.running import venue
 from tests.e2e.observe.figures import families
-from tests.e2e.running import venue
 
 ROOT = Path(__file__).parents[3]
 ALERTS = ROOT / "docker" / "prometheus" / "alerts.yaml"

@@ -12,7 +12,7 @@ import structlog
 
 from service.observability import outage_lines
 from service.observability.outage_lines import OutageLines
-from tests.homes import on_servers
+from testbed.homes import on_servers
 
 pytestmark = pytest.mark.slow
 

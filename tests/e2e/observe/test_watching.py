@@ -4,9 +4,9 @@ import json
 
 import pytest
 
+from testbed.homes import in_both_homes
+from testbed.running import wait_for
 from tests.e2e.observe.figures import families, figures
-from tests.e2e.running import wait_for
-from tests.homes import in_both_homes
 
 # What a caller may not make longer, however hard they try.
 LABELS_OF_CALLERS = ("method", "route", "status")

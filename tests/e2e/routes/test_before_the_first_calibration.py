@@ -9,8 +9,8 @@ import cv2
 import numpy as np
 import pytest
 
+from testbed.running import png
 from tests.e2e.commands import esc_here
-from tests.e2e.running import png
 from tests.worker.calibration.onboarding.test_first_pose import CAMERA, LENS, SIZE, clicks
 from tests.worker.calibration.onboarding.test_lens_calibration import BOARD, PINHOLE, corners_seen, photograph, places
 

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from tests.e2e.running import FRAMES, upload
+from testbed.running import FRAMES, upload
 
 
 def fit(service, name, options=None, headers=None, files=None):

@@ -6,7 +6,6 @@ import re
 import signal
 import subprocess
 import sys
-from contextlib import contextmanager
 from pathlib import Path
 
 import httpx
@@ -15,10 +14,10 @@ import pytest
 from service import child_process
 from service.store.database import connect
 from service.store.venues import VenueRepository
-from tests.e2e.running import DEADLINE_S, Service, venue, wait_for
-from tests.e2e.worker.test_callbacks import LOCAL, SECRET
-from tests.homes import in_both_homes
-from tests.worker.receiver import Receiver
+from testbed.homes import in_both_homes
+from testbed.running import DEADLINE_S, Service, venue, wait_for
+from tests.e2e.routes.event_stream import followed
+from tests.worker.receiver import LOCAL, SECRET, Receiver
 
 RENDERER = Path(__file__).parents[3] / "docs" / "examples" / "renderer.py"
 
@@ -48,14 +47,6 @@ class Stream:
         while events[-1]["event"] != name:
             events.append(self.next())
         return events
-
-
-@contextmanager
-def followed(service, name, last_id=None, **query):
-    headers = {} if last_id is None else {"Last-Event-ID": last_id}
-    url = f"{service.url}/venues/{name}/events"
-    with httpx.stream("GET", url, headers=headers, params=query, timeout=DEADLINE_S) as answer:
-        yield Stream(answer)
 
 
 @in_both_homes

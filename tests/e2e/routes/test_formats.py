@@ -2,7 +2,7 @@ import json
 
 import cv2
 
-from tests.e2e.running import SIZE
+from testbed.running import SIZE
 
 
 def poses(service, path, form, **more):

@@ -9,8 +9,8 @@ import sqlalchemy as sa
 
 from service.api.context import STREAM_PATIENCE_S
 from service.store.database import connect, migrate, without_timeouts
-from tests.e2e.routes.test_following import followed
-from tests.homes import on_servers
+from testbed.homes import on_servers
+from tests.e2e.routes.event_stream import followed
 
 # More than there are threads and connections.
 CALLERS = 60

@@ -8,9 +8,9 @@ import httpx
 import sqlalchemy as sa
 
 from service.store import tables
+from testbed.homes import in_both_homes
+from testbed.running import DEADLINE_S, alive, venue, wait_for
 from tests.e2e.observe.figures import figures
-from tests.e2e.running import DEADLINE_S, alive, venue, wait_for
-from tests.homes import in_both_homes
 
 # What a busy machine may add to what is promised.
 BUSY_S = 10

@@ -6,9 +6,9 @@ from contextlib import contextmanager
 import httpx
 import pytest
 
-from tests.e2e.routes.test_following import Stream
-from tests.e2e.running import DEADLINE_S, venue
-from tests.homes import in_both_homes
+from testbed.homes import in_both_homes
+from testbed.running import DEADLINE_S, venue
+from tests.e2e.routes.event_stream import Stream
 
 LEFT = {
     "id": "left",

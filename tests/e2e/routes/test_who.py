@@ -9,9 +9,9 @@ from service.schemas.actor import Actor
 from service.schemas.venue import VENUE_EXAMPLE, VenueIn
 from service.store.events.feed import EventRepository
 from service.store.venues import VenueRepository
+from testbed.running import Service, keys_in, venue
 from tests.e2e.commands import esc_here
-from tests.e2e.routes.test_following import Stream
-from tests.e2e.running import Service, keys_in, venue
+from tests.e2e.routes.event_stream import Stream
 
 TRUCK, OFFICE = "203.0.113.7", "2001:db8::7"
 

@@ -10,7 +10,7 @@ import obstore
 import pytest
 from obstore.store import from_url
 
-from tests.homes import on_servers, postgres_binaries
+from testbed.homes import on_servers, postgres_binaries
 
 PAGE = (Path(__file__).parents[3] / "docker" / "README.md").read_text()
 

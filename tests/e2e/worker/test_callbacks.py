@@ -4,7 +4,6 @@ import json
 import os
 import signal
 import threading
-from base64 import b64encode
 from datetime import UTC, datetime
 
 import pytest
@@ -12,13 +11,10 @@ import sqlalchemy as sa
 
 from service.settings import Settings
 from service.store import tables
+from testbed.running import wait_for
 from tests.e2e.commands import esc_here
-from tests.e2e.running import wait_for
-from tests.worker.receiver import Receiver
+from tests.worker.receiver import LOCAL, SECRET, Receiver
 from worker.duties import webhook_request
-
-SECRET = "whsec_" + b64encode(bytes(32)).decode()
-LOCAL = {"ESC_WEBHOOK_SECRET": SECRET, "ESC_CALLBACK_ALLOW_HTTP": "true", "ESC_CALLBACK_ALLOW_PRIVATE": "true"}
 
 
 class Holding(Receiver):

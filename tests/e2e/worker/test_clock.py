@@ -5,9 +5,9 @@ from datetime import UTC, datetime, timedelta
 
 import pytest
 
-from tests.clocks import Clock
-from tests.e2e.intake.cameras import NetworkCamera
-from tests.e2e.running import Service, venue, wait_for
+from testbed.clocks import Clock
+from testbed.network_cameras import NetworkCamera
+from testbed.running import Service, venue, wait_for
 
 AHEAD_S = 6 * 3600
 # Every quarter of an hour, and venues of one schedule are spread over another.

@@ -11,10 +11,10 @@ import sqlalchemy as sa
 
 from service.store import tables
 from service.store.database import connect, migrate, writing
-from tests.e2e import warm
+from testbed import warm
+from testbed.homes import Embedded, environment, files
+from testbed.running import Service, wait_for
 from tests.e2e.commands import esc_here, esc_process
-from tests.e2e.running import Service, wait_for
-from tests.homes import Embedded, environment, files
 
 GETS = (
     "/venues",

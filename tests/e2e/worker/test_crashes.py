@@ -5,9 +5,10 @@ import signal
 import time
 
 from service.serving import GRACE_S
-from tests.disks import filled
-from tests.e2e.books import settle
-from tests.e2e.killing import (
+from testbed.books import settle
+from testbed.disks import filled
+from testbed.homes import in_both_homes, on_servers
+from testbed.killing import (
     chance,
     kill_api,
     kill_kept_worker,
@@ -16,9 +17,8 @@ from tests.e2e.killing import (
     seconds_of_a_submission,
     submitted,
 )
+from testbed.running import Service, alive, children, wait_for
 from tests.e2e.observe.figures import figures
-from tests.e2e.running import Service, alive, children, wait_for
-from tests.homes import in_both_homes, on_servers
 
 # Beyond the silence: until a worker looks, takes the job out of the queue and begins.
 TAKING_OVER_S = 5

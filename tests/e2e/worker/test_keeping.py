@@ -6,9 +6,9 @@ import sqlalchemy as sa
 
 from service.store import tables
 from service.store.blobs import Blobs
-from tests.e2e.books import queued
-from tests.e2e.running import Service, wait_for
-from tests.homes import in_both_homes
+from testbed.books import queued
+from testbed.homes import in_both_homes
+from testbed.running import Service, wait_for
 
 
 def age(service, job: str, days: float) -> None:

@@ -6,9 +6,9 @@ import pytest
 import sqlalchemy as sa
 
 from service.store import tables
+from testbed.homes import in_both_homes
+from testbed.running import wait_for
 from tests.e2e.observe.figures import families
-from tests.e2e.running import wait_for
-from tests.homes import in_both_homes
 
 j = tables.jobs.c
 TAKEOVER_S = 3

@@ -1,66 +1,14 @@
 """The real engine and the real network behind the front door, on rendered frames of reduced size."""
 
 import json
-from functools import cache
 
 import cv2
 import numpy as np
 import pytest
 
-from models.training.pitches.render import Conditions, render_frame
-from tests.e2e.running import Service
-from worker.calibration.geometry.camera import Camera, Pose
-from worker.calibration.geometry.field import Field
-from worker.calibration.geometry.lens import Intrinsics
+from testbed.rendered_pair import PITCH, SIZE, cameras, encoded, frames, venue
+from testbed.running import Service
 from worker.calibration.geometry.rotation import rotation_angles_deg
-
-SIZE = (960, 540)
-PITCH = Field(105.0, 68.0, 0.12, np.array([[-18.5, 0.0, 0.35], [18.5, 0.0, 0.35]]))
-MOVED_M = np.array([0.06, -0.05, 0.04])
-TURNED = np.array([0.006, -0.005, 0.004])
-
-
-def cameras() -> list[Camera]:
-    lens = Intrinsics(
-        np.array([[615.0, 0, 480.5], [0, 615.0, 267.5], [0, 0, 1]]), np.array([-0.3, 0.08, 0, 0, 0]), SIZE
-    )
-    return [
-        Camera("left", lens, Pose.looking_at([-0.9, -48.0, 12.0], [-22.0, -12.0, 0.0])),
-        Camera("right", lens, Pose.looking_at([0.8, -48.0, 12.0], [22.0, -12.0, 0.0])),
-    ]
-
-
-@cache
-def frames() -> dict[str, bytes]:
-    rng = np.random.default_rng(0)
-    return {c.id: encoded(render_frame(PITCH, c, Conditions.fair(22), rng).frame) for c in cameras()}
-
-
-def encoded(frame: np.ndarray) -> bytes:
-    return cv2.imencode(".jpg", frame, [cv2.IMWRITE_JPEG_QUALITY, 92])[1].tobytes()
-
-
-def venue(name: str, right_turn=TURNED) -> dict:
-    return {
-        "id": name,
-        "name": "Rendered pitch",
-        "field": {"length_m": 105, "width_m": 68, "line_width_m": 0.12, "ridge": PITCH.ridge.tolist()},
-        "cameras": [
-            {
-                "id": c.id,
-                "image_size": list(SIZE),
-                "intrinsics": {
-                    "matrix": c.intrinsics.matrix.tolist(),
-                    "distortion": c.intrinsics.distortion.tolist(),
-                },
-                "pose": {
-                    "rotation": (c.pose.rotation + (TURNED if c.id == "left" else right_turn)).tolist(),
-                    "position": (c.pose.position + MOVED_M).tolist(),
-                },
-            }
-            for c in cameras()
-        ],
-    }
 
 
 @pytest.fixture

@@ -11,9 +11,9 @@ import pytest
 import sqlalchemy as sa
 
 from service.store import tables
-from tests.e2e.intake.cameras import NetworkCamera
-from tests.e2e.running import upload, venue, wait_for
-from tests.homes import in_both_homes
+from testbed.homes import in_both_homes
+from testbed.network_cameras import NetworkCamera
+from testbed.running import upload, venue, wait_for
 
 LIMIT, CLIENTS, JOB_S = 2, 4, 0.5
 # Until a place is free, frames are fetched by a process of their own, and the worker looks.

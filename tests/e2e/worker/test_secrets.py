@@ -6,7 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from tests.e2e.running import Service
+from testbed.running import Service
 from tests.unprivileged import drop_capabilities
 
 SECRET = "whsec_" + "c2VjcmV0" * 6

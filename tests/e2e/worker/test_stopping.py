@@ -7,11 +7,11 @@ import pytest
 
 from service.store.database import connect
 from service.store.workers import WorkerRepository
+from testbed.homes import in_both_homes
+from testbed.running import alive, wait_for
 from tests.e2e.commands import esc_process
 from tests.e2e.observe.figures import figures
-from tests.e2e.running import alive, wait_for
 from tests.e2e.worker.test_crashes import poses
-from tests.homes import in_both_homes
 
 # Far below ESC_DRAIN_S as it is unless set, far above what a process needs to end.
 AT_ONCE_S = 15

@@ -4,7 +4,7 @@ import time
 
 import sqlalchemy as sa
 
-from tests.homes import on_servers
+from testbed.homes import on_servers
 
 IDLE_S = 5
 # A worker looks into the queue twice a second, and its duties look every other second.

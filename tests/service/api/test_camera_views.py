@@ -11,7 +11,7 @@ from service.intake.snapshots import Snapshots
 from service.schemas.problems import Problem
 from service.schemas.venue import VenueIn
 from service.settings import Settings
-from tests.e2e.running import png, venue
+from testbed.running import png, venue
 
 # Notes that it was asked, takes its time, and gives each camera the frame that it was given, or none.
 FETCH = """

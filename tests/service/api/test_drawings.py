@@ -12,9 +12,9 @@ from service.schemas.problems import Problem
 from service.settings import Settings
 from service.store import blobs
 from service.store.jobs.files import source_file
-from tests.e2e.running import wait_for
-from tests.homes import in_both_homes
-from tests.worker.stock import result
+from testbed.homes import in_both_homes
+from testbed.running import wait_for
+from testbed.stock import result
 
 # Draws what it is asked for: its name, and the frames it was given.
 DRAWING = """

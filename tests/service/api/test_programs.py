@@ -15,7 +15,7 @@ from service.formats import stmap
 from service.schemas.problems import Problem
 from service.schemas.programs.clicked_pose import ClickedPoseRequest
 from service.settings import Settings
-from tests.e2e.running import venue, wait_for
+from testbed.running import venue, wait_for
 from tests.service.formats.cameras import shot
 
 SLOW = [sys.executable, "-c", "import sys, time; time.sleep(0.5); sys.stdout.write(sys.stdin.read())"]

@@ -12,7 +12,7 @@ from service.schemas.problems import Problem
 from service.schemas.venue import VenueIn
 from service.schemas.view import ViewChoice
 from service.settings import Settings
-from tests.e2e.running import venue
+from testbed.running import venue
 
 # Says that it has begun, waits, and answers with what it was asked.
 SLOW = """

@@ -8,8 +8,8 @@ from service.cli.answers import outcome_text, print_field_summary
 from service.schemas.job import Job
 from service.schemas.results import FieldResult, MeasureResult, Provenance
 from service.schemas.venue import VenueIn
-from tests.e2e.running import venue
-from tests.worker.stock import result
+from testbed.running import venue
+from testbed.stock import result
 
 VENUE = VenueIn.model_validate(venue("v")).to_venue()
 

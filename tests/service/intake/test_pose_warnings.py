@@ -10,7 +10,7 @@ from service.intake.pose_warnings import warnings_of
 from service.schemas.geometry import Pose
 from service.schemas.venue import VenueIn
 
-DEMO = VenueIn.model_validate_json((Path(__file__).parents[2] / "demo" / "venue.json").read_bytes())
+DEMO = VenueIn.model_validate_json((Path(__file__).parents[3] / "demo" / "venue.json").read_bytes())
 
 
 def warned(change):

@@ -9,7 +9,7 @@ from service.intake.snapshots import Snapshots
 from service.schemas.problems import Problem
 from service.schemas.venue import VenueIn
 from service.settings import Settings
-from tests.e2e.running import venue
+from testbed.running import venue
 
 
 def test_the_program_that_fetches_frames_sees_no_secret_of_the_service(monkeypatch, tmp_path):

@@ -18,8 +18,8 @@ from service.schemas.venue import VenueIn
 from service.settings import Settings
 from service.store.jobs.queries import JobPage
 from service.store.jobs.task import Origin
-from tests.e2e.running import png, venue
-from tests.homes import files, in_both_homes
+from testbed.homes import files, in_both_homes
+from testbed.running import png, venue
 from tests.problems import refused
 
 pytestmark = in_both_homes

@@ -13,7 +13,7 @@ from service.live.stored_poses import StoredPoses
 from service.schemas.geometry import Pose
 from service.schemas.live import LiveSender, LiveState
 from service.schemas.venue import VenueIn
-from tests.e2e.running import venue
+from testbed.running import venue
 
 VENUE = VenueIn.model_validate(venue("v")).to_venue()
 LEFT = VENUE.cameras[0]

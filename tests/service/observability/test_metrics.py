@@ -16,9 +16,9 @@ from service.store import tables
 from service.store.statistics.job_outcome import STAGES
 from service.store.statistics.snapshot import read_statistics
 from service.store.workers import WorkerRepository
-from tests.homes import in_both_homes
+from testbed.homes import in_both_homes
+from testbed.stock import Stock, result
 from tests.trending import displacement, night
-from tests.worker.stock import Stock, result
 
 pytestmark = in_both_homes
 SILENCE_S = 10

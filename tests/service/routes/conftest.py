@@ -3,7 +3,7 @@
 import pytest
 
 from service.settings import Settings
-from tests.homes import Embedded
+from testbed.homes import Embedded
 from tests.service.local_service import LocalService
 
 

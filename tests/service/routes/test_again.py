@@ -1,6 +1,6 @@
 """A job's frames once more."""
 
-from tests.e2e.running import venue
+from testbed.running import venue
 from tests.service.routes.test_find import forget_frames
 
 

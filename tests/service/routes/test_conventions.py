@@ -3,7 +3,7 @@
 import httpx
 import pytest
 
-from tests.e2e.running import venue
+from testbed.running import venue
 
 
 def test_a_weak_tag_is_no_condition_for_a_change_and_one_for_a_read(service, name):

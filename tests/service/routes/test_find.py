@@ -1,50 +1,10 @@
 """Finding cameras by HTTP: of a venue that is not stored yet and of one that is, and taking what was found."""
 
-import json
-from datetime import UTC, datetime
-
 import pytest
-import sqlalchemy as sa
 
-from service.store import tables
-from tests.e2e.running import png, upload, venue
-from tests.homes import in_both_homes
-
-
-def site(name, behaviour="accept", cameras=("left", "right"), **known):
-    """A venue of which nothing is known but the sport and the names of its cameras."""
-    places = [{"id": camera, **known.get(camera, {})} for camera in cameras]
-    return {"id": name, "name": behaviour, "field": {"template": "football"}, "cameras": places}
-
-
-def find(service, name, *, place=None, files=None, headers=None, **options):
-    parts = upload() if files is None else files
-    if place is not None:
-        parts = [*parts, ("site", ("site.json", json.dumps(place)))]
-    if options:
-        parts = [*parts, ("options", (None, json.dumps(options)))]
-    return service.http.post(f"/venues/{name}/find", files=parts, headers=headers)
-
-
-def found(service, name, **asked):
-    """A search at its end."""
-    return service.end(find(service, name, **asked).raise_for_status().json()["id"])
-
-
-def adopt(service, name, job, headers=None, **candidates):
-    return service.http.post(
-        f"/venues/{name}/adopt-found", json={"job": job["id"], "candidates": candidates}, headers=headers
-    )
-
-
-def refused(answer):
-    assert answer.headers["content-type"] == "application/problem+json"
-    return answer.status_code, answer.json()["type"].removeprefix("/problems/")
-
-
-def depth(stored, camera):
-    """Distance of a camera to the pitch in m: 40 is the first candidate, 60 the second, 50 none of them."""
-    return -next(one for one in stored["cameras"] if one["id"] == camera)["pose"]["position"][1]
+from testbed.homes import in_both_homes
+from testbed.running import png, upload, venue
+from tests.e2e.routes.searching import adopt, depth, find, forget_frames, found, refused, site
 
 
 def test_a_search_is_a_job_with_candidates_and_a_picture_of_each(service, name):
@@ -148,13 +108,6 @@ def test_why_the_frames_of_a_job_calibrate_nothing_is_said(service, name):
 
 def calibrate(service, job):
     return service.http.post(f"/jobs/{job['id']}/calibrate")
-
-
-def forget_frames(service, job):
-    """Let the frames of a job expire."""
-    with service.database() as connection:
-        gone = sa.update(tables.jobs).where(tables.jobs.c.id == job["id"]).values(frames_deleted_at=datetime.now(UTC))
-        connection.execute(gone)
 
 
 def test_a_new_venue_gets_the_ridge_that_was_found_with_its_cameras(service, name):

@@ -6,8 +6,8 @@ import OpenEXR
 import pytest
 
 from service.schemas.names import FormatName
-from tests.e2e.program import NEARER
-from tests.e2e.running import SIZE
+from testbed.program import NEARER
+from testbed.running import SIZE
 
 
 def poses(service, path, form, **more):

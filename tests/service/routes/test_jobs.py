@@ -6,8 +6,8 @@ import pytest
 import sqlalchemy as sa
 
 from service.store import tables
-from tests.e2e.running import SIZE, png, upload
-from tests.homes import in_both_homes
+from testbed.homes import in_both_homes
+from testbed.running import SIZE, png, upload
 
 
 @in_both_homes

@@ -2,8 +2,8 @@
 
 import pytest
 
-from tests.e2e.running import venue
-from tests.homes import in_both_homes
+from testbed.homes import in_both_homes
+from testbed.running import venue
 
 
 def listed(service, path, **chosen):

@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.e2e.running import venue
+from testbed.running import venue
 
 
 def poses(service, address, **params):

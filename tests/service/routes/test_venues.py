@@ -2,7 +2,7 @@ import json
 
 import pytest
 
-from tests.e2e.running import venue
+from testbed.running import venue
 
 MEASURED = {"length_m": 0.03, "width_m": 0.02}
 

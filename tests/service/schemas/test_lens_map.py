@@ -142,7 +142,7 @@ def test_numbers_of_any_size_are_refused_or_taken_with_a_lens_that_can_be_comput
 
 
 def test_the_lenses_of_the_demo_and_of_the_documented_example_leave_nothing_to_be_said():
-    demo = VenueIn.model_validate_json((Path(__file__).parents[2] / "demo" / "venue.json").read_bytes())
+    demo = VenueIn.model_validate_json((Path(__file__).parents[3] / "demo" / "venue.json").read_bytes())
     for venue in (demo, VenueIn.model_validate(VENUE_EXAMPLE)):
         assert venue.to_venue().lens_warnings == []
 

@@ -2,7 +2,7 @@
 
 from service.schemas.results import Result
 from service.schemas.venue import VENUE_EXAMPLE, VenueIn
-from tests.worker.stock import result
+from testbed.stock import result
 
 ADDED = {"expected_found", "unexpected", "markings", "refusal"}
 

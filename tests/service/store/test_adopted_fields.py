@@ -6,10 +6,10 @@ import pytest
 from service.schemas.field import FieldOfPlay
 from service.schemas.results import AdoptableNumber
 from service.store.memories import newest_memories
-from tests.homes import in_both_homes
+from testbed.homes import in_both_homes
+from testbed.stock import result
 from tests.problems import refused
 from tests.service.store.test_refined import refined
-from tests.worker.stock import result
 from worker.calibration.geometry.field import Field
 from worker.jobs.from_schemas import pitch_of
 

@@ -3,7 +3,7 @@
 from service.schemas.health import Alarms as Rules
 from service.schemas.job import JobError
 from service.store.statistics.snapshot import read_statistics
-from tests.homes import in_both_homes
+from testbed.homes import in_both_homes
 from worker.duties.alarms import AlarmTimer
 
 URL = "https://example.com/alarms"

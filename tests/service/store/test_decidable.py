@@ -1,7 +1,7 @@
 """What can still be decided about a calibration is what is then not refused."""
 
 from service.store.jobs.decisions import OpenDecisions
-from tests.homes import in_both_homes
+from testbed.homes import in_both_homes
 from tests.problems import refused
 
 BOTH = frozenset({"left", "right"})

@@ -12,8 +12,8 @@ from service.schemas.venue import Venue, VenueIn
 from service.store import tables
 from service.store.documents import to_document
 from service.store.jobs.task import UnreadableJob
-from tests.e2e.running import venue
-from tests.homes import in_both_homes
+from testbed.homes import in_both_homes
+from testbed.running import venue
 
 v = tables.venues.c
 

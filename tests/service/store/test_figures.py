@@ -9,8 +9,8 @@ from service.schemas.job import JobError
 from service.store.statistics.counters import STAGE, HistogramBuckets, add, read
 from service.store.statistics.job_outcome import ENDED, ERRORS, STAGES, JobOutcome
 from service.store.statistics.snapshot import read_statistics
-from tests.homes import in_both_homes
-from tests.worker.stock import result
+from testbed.homes import in_both_homes
+from testbed.stock import result
 
 NOON = datetime(2026, 11, 21, 12, tzinfo=UTC)
 TIMES = HistogramBuckets("t", (1, 5))

@@ -8,8 +8,8 @@ import sqlalchemy as sa
 from service.schemas.events.webhooks import Webhook
 from service.schemas.job import JobError
 from service.store import tables
-from tests.homes import in_both_homes
-from tests.worker.stock import Stock
+from testbed.homes import in_both_homes
+from testbed.stock import Stock
 
 
 def told(stock, venue="v", seen=0, kinds=()):

@@ -7,7 +7,7 @@ import sqlalchemy as sa
 from service.pages.venues import venue_rows
 from service.schemas.health import Alarms
 from service.store.statistics.venue_summary import IN_CURVE
-from tests.homes import in_both_homes
+from testbed.homes import in_both_homes
 
 
 def glance(stock, venue="v"):

@@ -4,7 +4,7 @@ from datetime import UTC, datetime, timedelta
 import pytest
 
 from service.store.keys import KeyExists, KeyRepository, hash_of
-from tests.homes import in_both_homes
+from testbed.homes import in_both_homes
 
 NOON = datetime(2026, 11, 21, 12, tzinfo=UTC)
 

@@ -5,10 +5,10 @@ import pytest
 from service.schemas.geometry import Moved
 from service.schemas.results import Proposal
 from service.store.memories import newest_memories
+from testbed.stock import result
 from tests.service.store.test_alarms import rings, told, watched
 from tests.service.store.test_partly import standing
 from tests.trending import displacement
-from tests.worker.stock import result
 
 WORDS = "turned by 11.2 degrees and moved by 0.30 m, and found again: 97% of the lines are seen there"
 MEMORY = {"format": 1}

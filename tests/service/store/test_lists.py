@@ -8,7 +8,7 @@ import sqlalchemy as sa
 
 from service.store import tables
 from service.store.jobs.queries import JobPage
-from tests.homes import in_both_homes
+from testbed.homes import in_both_homes
 
 # So many that reading all of them, or all of the commonest kind, takes longer than a list may.
 JOBS, VENUES, PAGE = 4000, 200, 50

@@ -9,7 +9,7 @@ from service.schemas.health import Alarms as Rules
 from service.schemas.live import LiveReport, LiveState
 from service.store import tables
 from service.store.statistics.snapshot import read_statistics
-from tests.homes import in_both_homes
+from testbed.homes import in_both_homes
 from worker.duties.alarms import AlarmTimer
 from worker.duties.retention import Retention
 

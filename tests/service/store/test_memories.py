@@ -8,8 +8,8 @@ from service.schemas.field import FieldOfPlay
 from service.schemas.geometry import Intrinsics
 from service.store import tables
 from service.store.memories import KEPT, LARGEST_BYTES, newest_memories
-from tests.homes import in_both_homes
-from tests.worker.stock import result
+from testbed.homes import in_both_homes
+from testbed.stock import result
 
 pytestmark = pytest.mark.slow
 

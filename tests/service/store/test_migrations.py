@@ -10,8 +10,8 @@ from alembic.migration import MigrationContext
 from service.store import tables
 from service.store.database import SCHEMA_TABLE, UnsupportedDatabase, connect, migrate, newest_schema, writing
 from service.store.repositories import Repositories
-from tests.homes import in_both_homes
-from tests.released import load_dump
+from testbed.homes import in_both_homes
+from testbed.released import load_dump
 
 pytestmark = pytest.mark.slow
 

@@ -5,10 +5,10 @@ import pytest
 from service.schemas.geometry import Light
 from service.schemas.results import View
 from service.store.statistics.snapshot import read_statistics
-from tests.homes import in_both_homes
+from testbed.homes import in_both_homes
+from testbed.stock import result
 from tests.problems import refused
 from tests.service.store.test_alarms import failed, rings, told, watched
-from tests.worker.stock import result
 
 
 def standing(stock):

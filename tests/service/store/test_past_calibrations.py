@@ -2,7 +2,7 @@
 
 from datetime import UTC, datetime, timedelta
 
-from tests.homes import in_both_homes
+from testbed.homes import in_both_homes
 
 NOW = datetime(2026, 11, 21, 12, tzinfo=UTC)
 

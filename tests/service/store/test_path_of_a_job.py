@@ -10,9 +10,9 @@ import sqlalchemy as sa
 from service import queue
 from service.schemas.job import Progress
 from service.schemas.trend import Displacement
-from tests.e2e.program import DISPLACEMENT
-from tests.homes import in_both_homes
-from tests.worker.stock import result
+from testbed.homes import in_both_homes
+from testbed.program import DISPLACEMENT
+from testbed.stock import result
 
 
 @pytest.fixture

@@ -7,9 +7,9 @@ from service.schemas.geometry import Intrinsics, Pose
 from service.schemas.results import Refined
 from service.store import tables
 from service.store.memories import newest_memories
-from tests.homes import in_both_homes
+from testbed.homes import in_both_homes
+from testbed.stock import result
 from tests.problems import refused
-from tests.worker.stock import result
 
 LENS = Intrinsics(matrix=[[60.06, 0, 32], [0, 60.06, 24], [0, 0, 1]], distortion=[0, 0, 0, 0], sigma={"fx": 0.01})
 

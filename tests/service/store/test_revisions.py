@@ -4,9 +4,9 @@ import pytest
 
 from service.schemas.field import FieldOfPlay
 from service.schemas.geometry import Intrinsics
-from tests.homes import in_both_homes
+from testbed.homes import in_both_homes
+from testbed.stock import result
 from tests.problems import refused
-from tests.worker.stock import result
 
 
 def told(stock):

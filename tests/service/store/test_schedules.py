@@ -7,7 +7,7 @@ import pytest
 
 from service.schemas.schedule import InvalidSchedule, Schedule, next_time, phase_of
 from service.store.schedules import ScheduleRepository
-from tests.homes import in_both_homes
+from testbed.homes import in_both_homes
 
 NOON = datetime(2026, 11, 21, 12, tzinfo=UTC)
 LEASE = timedelta(minutes=10)

@@ -19,9 +19,9 @@ from service.store.ids import new_id
 from service.store.preconditions import Precondition
 from service.store.venues import VenueRepository
 from service.store.workers import WorkerRepository
-from tests.homes import in_both_homes, on_servers
+from testbed.homes import in_both_homes, on_servers
+from testbed.stock import result
 from tests.problems import refused
-from tests.worker.stock import result
 
 
 @in_both_homes

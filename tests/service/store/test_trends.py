@@ -7,7 +7,7 @@ import sqlalchemy as sa
 
 from service.schemas.health import Alarms
 from service.store import tables, trends
-from tests.homes import in_both_homes
+from testbed.homes import in_both_homes
 from tests.trending import SIGMA_M, displacement, night, nights, noisy
 
 pytestmark = pytest.mark.slow

@@ -9,10 +9,10 @@ from service.schemas.addresses import HIDDEN
 from service.schemas.source_urls import SourceSecrets
 from service.store import tables, unreadable
 from service.store.unreadable import UnreadableRow
-from tests.e2e.running import venue
-from tests.homes import in_both_homes
+from testbed.homes import in_both_homes
+from testbed.running import venue
+from testbed.stock import result
 from tests.service.local_service import LocalService
-from tests.worker.stock import result
 from worker.duties.alarms import AlarmTimer
 
 SUNKEN = [[-18.5, 0.0, -0.001], [18.5, 0.0, -0.001]]

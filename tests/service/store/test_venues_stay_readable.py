@@ -17,10 +17,10 @@ from hypothesis.stateful import (
 )
 
 from service.schemas.job import JobError
-from tests.e2e.running import venue
-from tests.homes import in_both_homes
+from testbed.homes import in_both_homes
+from testbed.running import venue
+from testbed.stock import result
 from tests.service.local_service import LocalService
-from tests.worker.stock import result
 from worker.protocol import Message
 from worker.result_checks import fault_in
 

@@ -4,7 +4,7 @@ from functools import cache
 
 import numpy as np
 
-from tests.worker.calibration.synthetic import paint_frame, paint_markings, pair_frames, pair_markings
+from testbed.synthetic import paint_frame, paint_markings, pair_frames, pair_markings
 from worker.calibration.detection.contrast import Channels
 from worker.calibration.refinement.refine import Observations
 

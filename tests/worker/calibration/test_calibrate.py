@@ -1,12 +1,19 @@
 """The whole engine on painted frames, with a segmentation that sees white on green."""
 
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
 
-from tests.worker.calibration.synthetic import CROWNED, moved, pair, pair_frames
+from testbed.synthetic import CROWNED, moved, pair
+from tests.worker.calibration.outdated_pair import (
+    SHIFT,
+    frames,
+    outdated,
+    result,
+    run,
+    white_on_green,
+)
 from worker.calibration.calibrate import calibrate
 from worker.calibration.gate.quality import ridge_rejection
 from worker.calibration.geometry.parameters import free_focal_lengths
@@ -14,40 +21,6 @@ from worker.calibration.geometry.rotation import rotation_angles_deg
 from worker.calibration.records import CalibrationError, Options, Stopped
 
 pytestmark = pytest.mark.slow
-
-TURN = (0.006, -0.005, 0.004)
-SHIFT = (0.05, -0.06, 0.04)
-# The darkest channel of grass, which lines are paler than.
-GRASS_AT_MOST = 70.0
-
-
-def frames():
-    return {c.id: (frame,) for c, frame in zip(pair(), pair_frames(), strict=True)}
-
-
-def white_on_green(frame, regions):
-    if not regions:
-        return np.zeros(frame.shape[:2], dtype=np.uint8)
-    palest = frame.min(axis=-1)
-    # Fog and a grey cover are pale all over, and no line, as the network knows too.
-    if np.median(palest[::8, ::8]) > GRASS_AT_MOST:
-        return np.zeros(frame.shape[:2], dtype=np.uint8)
-    is_sky = (frame[..., 0] > 200) & (frame[..., 2] < 200)
-    whiteness = np.clip((palest - GRASS_AT_MOST) * 2, 0, 255)
-    return np.where(is_sky, 0, whiteness).astype(np.uint8)
-
-
-def outdated():
-    return [moved(c, TURN, SHIFT) for c in pair()]
-
-
-def run(cameras=None, pictures=None, **options):
-    return calibrate(CROWNED, cameras or outdated(), pictures or frames(), white_on_green, Options(**options))
-
-
-@cache
-def result():
-    return run(seed=3)
 
 
 def test_outdated_poses_are_found_again():
@@ -127,8 +100,8 @@ def test_what_walks_through_one_of_three_frames_does_not_matter():
     with_player = {name: [f[0].copy() for _ in range(3)] for name, f in frames().items()}
     with_player["left"][1][200:400, 500:560] = 255
     found = run(pictures=with_player)
-    for truth, result in zip(pair(), found.cameras, strict=True):
-        assert np.linalg.norm(result.camera.pose.position - truth.pose.position) < 0.03
+    for truth, one in zip(pair(), found.cameras, strict=True):
+        assert np.linalg.norm(one.camera.pose.position - truth.pose.position) < 0.03
 
 
 def test_progress_runs_through_the_stages_and_never_back():

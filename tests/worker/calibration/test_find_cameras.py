@@ -6,10 +6,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from tests.worker.calibration import synthetic
-from tests.worker.calibration.gate.test_quality import good
-from tests.worker.calibration.synthetic import CROWNED, PITCH, moved, paint_frame, pair, pair_frames, worn
-from tests.worker.calibration.test_calibrate import white_on_green
+from testbed import synthetic
+from testbed.synthetic import CROWNED, PITCH, moved, paint_frame, pair, pair_frames, worn
+from tests.worker.calibration.gate.good_result import good
+from tests.worker.calibration.outdated_pair import white_on_green
 from worker.calibration.find_cameras import FoundCamera, find_cameras, why_lens_unfit, why_not_confirmed
 from worker.calibration.gate.quality import GATE
 from worker.calibration.geometry.rotation import rotation_angles_deg

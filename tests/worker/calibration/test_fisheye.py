@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.worker.calibration.synthetic import CROWNED, PITCH, moved, paint_frame
-from tests.worker.calibration.test_calibrate import white_on_green
+from testbed.synthetic import CROWNED, PITCH, moved, paint_frame
+from tests.worker.calibration.outdated_pair import white_on_green
 from worker.calibration.calibrate import calibrate
 from worker.calibration.detection.segmentation import reachable_regions
 from worker.calibration.geometry.camera import Camera, Pose, inside, project, project_planes

@@ -5,8 +5,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from tests.worker.calibration.synthetic import CROWNED, GRASS, moved, paint_frame, pair, pair_frames
-from tests.worker.calibration.test_calibrate import white_on_green
+from testbed.synthetic import CROWNED, GRASS, moved, paint_frame, pair, pair_frames
+from tests.worker.calibration.outdated_pair import WIND, white_on_green
 from worker.calibration import solve as settling
 from worker.calibration.calibrate import calibrate
 from worker.calibration.detection.segmentation import OVERVIEW_WIDTH_PX
@@ -18,7 +18,6 @@ from worker.calibration.records import Calibration, Options
 pytestmark = pytest.mark.slow
 
 # What the wind does in a quarter of an hour: a pixel of these small frames.
-WIND = ((0.0012, -0.0008, 0.0005), (0.01, 0.005, -0.01))
 STORM = ((0.012, -0.018, 0.006), (0.12, -0.08, 0.1))
 
 

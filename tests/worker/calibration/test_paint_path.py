@@ -7,7 +7,7 @@ import pytest
 
 from fields.template import load
 from models import MODEL_PATH
-from tests.worker.calibration.synthetic import GRASS, PAINTS, camera, moved, paint_markings
+from testbed.synthetic import GRASS, PAINTS, camera, moved, paint_markings
 from worker.calibration import solve
 from worker.calibration.calibrate import calibrate
 from worker.calibration.detection.segmentation import Segmenter

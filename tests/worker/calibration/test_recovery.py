@@ -9,10 +9,9 @@ import cv2
 import numpy as np
 import pytest
 
-from tests.worker.calibration.synthetic import CROWNED, camera, moved, paint_frame, pair
-from tests.worker.calibration.test_calibrate import SHIFT, TURN, frames, outdated, white_on_green
-from tests.worker.calibration.test_near_path import WIND
-from tests.worker.calibration.test_sports import field
+from testbed.synthetic import CROWNED, camera, moved, paint_frame, pair
+from tests.worker.calibration.outdated_pair import SHIFT, TURN, WIND, frames, outdated, white_on_green
+from tests.worker.calibration.sports import field
 from worker.calibration import recovery
 from worker.calibration.calibrate import calibrate
 from worker.calibration.gate.quality import Refusal

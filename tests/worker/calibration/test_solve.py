@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.worker.calibration.synthetic import CROWNED, pair, pair_frames
+from testbed.synthetic import CROWNED, pair, pair_frames
 from worker.calibration import solve
 from worker.calibration.detection.contrast import Channels
 from worker.calibration.geometry.camera import Pose

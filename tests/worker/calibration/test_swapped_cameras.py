@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from tests.worker.calibration.synthetic import CROWNED, camera, moved, paint_markings, pair
-from tests.worker.calibration.test_calibrate import frames, outdated, result, run
-from tests.worker.calibration.test_near_path import WIND
+from testbed.synthetic import CROWNED, camera, moved, paint_markings, pair
+from tests.worker.calibration.outdated_pair import WIND, frames, outdated, result, run
 from worker.calibration.geometry.camera import Pose
 
 pytestmark = pytest.mark.slow

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from testbed.spoiling import fogged
+from testbed.synthetic import BARREL, CROWNED, camera, moved, paint_frame
 from tests.scenes import chain
-from tests.worker.calibration.detection.spoiling import fogged
-from tests.worker.calibration.synthetic import BARREL, CROWNED, camera, moved, paint_frame
-from tests.worker.calibration.test_calibrate import SHIFT, TURN, white_on_green
-from tests.worker.calibration.test_sports import field
+from tests.worker.calibration.outdated_pair import SHIFT, TURN, white_on_green
+from tests.worker.calibration.sports import field
 from worker.calibration import calibrate as engine
 from worker.calibration import solve, wide_path
 from worker.calibration.calibrate import calibrate

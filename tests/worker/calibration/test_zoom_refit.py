@@ -6,9 +6,9 @@ from functools import cache
 import numpy as np
 import pytest
 
+from testbed.synthetic import CROWNED, camera, moved, paint_frame
 from tests.scenes import plane
-from tests.worker.calibration.synthetic import CROWNED, camera, moved, paint_frame
-from tests.worker.calibration.test_calibrate import white_on_green
+from tests.worker.calibration.outdated_pair import white_on_green
 from worker.calibration import solve, wide_path
 from worker.calibration.calibrate import calibrate
 from worker.calibration.geometry.camera import Camera

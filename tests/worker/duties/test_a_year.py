@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from service.schemas.health import Alarms as Rules
-from tests.worker.calibration.synthetic import CROWNED, moved, paint_frame
-from tests.worker.duties.year import VENUE, Frames, Year, cameras, fast_motion, frames_of, longer
+from testbed.synthetic import CROWNED, moved, paint_frame
+from testbed.year import VENUE, Frames, Year, cameras, fast_motion, frames_of, longer
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.field import Field
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from service.schemas.health import Alarms as Rules
-from tests.worker.duties.year import VENUE, Year, cameras, fast_motion, frames_of
+from testbed.year import VENUE, Year, cameras, fast_motion, frames_of
 
 pytestmark = pytest.mark.slow
 

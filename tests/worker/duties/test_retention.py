@@ -12,8 +12,8 @@ from service.store.blobs import BlobFolderUnavailable
 from service.store.jobs.files import source_file
 from service.store.jobs.queries import JobPage
 from service.store.statistics import counters
-from tests.homes import in_both_homes
-from tests.worker.stock import Stock
+from testbed.homes import in_both_homes
+from testbed.stock import Stock
 from worker.duties.retention import AT_ONCE, FOLDERS_OF_A_JOB, TRY_AGAIN_AFTER, Retention
 
 pytestmark = [pytest.mark.slow, in_both_homes]

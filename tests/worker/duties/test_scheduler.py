@@ -19,9 +19,9 @@ from service.store import tables
 from service.store.jobs.queries import JobPage
 from service.store.statistics.job_outcome import ENDED
 from service.store.statistics.snapshot import read_statistics as look_at_figures
-from tests.e2e.intake.cameras import NetworkCamera
-from tests.e2e.running import png, venue
-from tests.homes import in_both_homes
+from testbed.homes import in_both_homes
+from testbed.network_cameras import NetworkCamera
+from testbed.running import png, venue
 from worker.duties import scheduler
 from worker.duties.scheduler import DEFER, Scheduler
 

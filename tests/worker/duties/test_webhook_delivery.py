@@ -14,9 +14,9 @@ from service.schemas.health import Alarms
 from service.store import tables
 from service.store.events.outbox import AT_ONCE_PER_RECEIVER
 from service.store.jobs.queries import JobPage
-from tests.homes import in_both_homes
+from testbed.homes import in_both_homes
+from testbed.stock import Stock
 from tests.worker.receiver import Receiver, Silent, Talkative, resolve_to
-from tests.worker.stock import Stock
 from worker.duties import webhook_request
 from worker.duties.webhook_delivery import AT_ONCE, ATTEMPT, WebhookDelivery
 

@@ -18,7 +18,7 @@ from service.schemas.results import AdoptableNumber
 from service.schemas.venue import VenueIn
 from service.settings import MODEL_BESIDE_THE_CODE
 from service.store.jobs.files import drawn_together, picture_file
-from tests.worker.jobs.by_models import solve
+from testbed.by_models import solve
 from worker.calibration import records as engine
 from worker.calibration.detection.evidence import Evidence
 from worker.calibration.detection.view_condition import UsualView, ViewCondition, ViewFigures

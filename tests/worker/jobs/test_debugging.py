@@ -7,14 +7,14 @@ import pytest
 from service.schemas.options import Options
 from service.schemas.venue import VenueIn
 from service.settings import MODEL_BESIDE_THE_CODE
+from testbed.by_models import solve
 from tests.architecture import ROOT
-from tests.worker.jobs.by_models import solve
 from worker.compute_resources import ComputeResources
 from worker.jobs.debugging import DebugRecorder
 
 pytestmark = pytest.mark.slow
 
-DEMO = ROOT / "tests/demo"
+DEMO = ROOT / "demo"
 SHRUNK = 4
 OF_CAMERA = ("view.json", "response.png", "lines.json", "lines.jpg", "residuals.jpg", "ground.jpg")
 

@@ -15,7 +15,7 @@ from worker.jobs.jpeg import DamagedPictureError
 
 pytestmark = pytest.mark.slow
 
-SCENE = cv2.imread("tests/demo/left.jpg", cv2.IMREAD_REDUCED_COLOR_4)
+SCENE = cv2.imread("demo/left.jpg", cv2.IMREAD_REDUCED_COLOR_4)
 
 
 def as_opencv_reads(file, flags=cv2.IMREAD_COLOR_BGR):
@@ -51,7 +51,7 @@ def test_a_jpeg_that_is_damaged_in_its_scan_is_not_decoded(kind):
 @pytest.mark.parametrize("quality", [80, 95])
 @pytest.mark.parametrize("kind", DAMAGES)
 def test_one_of_eight_hundred_damages_of_a_frame_of_4k_is_not_seen(kind, quality):
-    frame = cv2.imread("tests/demo/left.jpg")
+    frame = cv2.imread("demo/left.jpg")
     whole = cv2.imencode(".jpg", frame, [cv2.IMWRITE_JPEG_QUALITY, quality])[1].tobytes()
     # Zeros that left as many blocks as there were, and a step straight across the picture: so do bars of a broadcast.
     assert unseen_damages(whole, kind, 100) == ((kind, quality) == ("zeroed", 80))
@@ -59,7 +59,7 @@ def test_one_of_eight_hundred_damages_of_a_frame_of_4k_is_not_seen(kind, quality
 
 @pytest.mark.long
 def test_a_thousand_whole_pictures_are_decoded():
-    scenes = [cv2.imread(f"tests/demo/{camera}.jpg", cv2.IMREAD_REDUCED_COLOR_4) for camera in ("left", "right")]
+    scenes = [cv2.imread(f"demo/{camera}.jpg", cv2.IMREAD_REDUCED_COLOR_4) for camera in ("left", "right")]
     count = 0
     for scene in scenes:
         for cut in range(0, 48, 8):

@@ -7,8 +7,8 @@ import pytest
 
 from service.schemas.geometry import PosedCamera
 from service.schemas.trend import Anchor
-from tests.worker.calibration.gate.test_quality import good
-from tests.worker.calibration.synthetic import PITCH, camera
+from testbed.synthetic import PITCH, camera
+from tests.worker.calibration.gate.good_result import good
 from worker.calibration.geometry.camera import Pose
 from worker.calibration.refinement.uncertainty import Deviation
 from worker.jobs.to_schemas import displacement_to_schema, lens_to_schema, pose_to_schema

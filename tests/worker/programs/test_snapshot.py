@@ -17,7 +17,7 @@ from service.intake.snapshots import Snapshots
 from service.schemas.problems import Problem
 from service.schemas.venue import VenueIn
 from service.settings import Settings
-from tests.e2e.running import venue
+from testbed.running import venue
 from tests.listener import Parrot
 from tests.worker.certificates import certificate
 from tests.worker.receiver import TELLTALE

@@ -15,13 +15,13 @@ import numpy as np
 import OpenEXR
 import pytest
 
+import demo
 from service.schemas.field import FieldOfPlay
 from service.schemas.geometry import Light, Pose
 from service.schemas.programs.stitching import StitchRequest
 from service.schemas.venue import VenueIn
 from service.schemas.view import ViewChoice
-from tests import demo
-from tests.worker.calibration.synthetic import PITCH, camera, paint_frame
+from testbed.synthetic import PITCH, camera, paint_frame
 from worker.calibration.geometry.lens import Fisheye
 from worker.calibration.stitching.panorama import BACKDROP
 from worker.jobs.from_schemas import camera_of

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tests.worker.calibration.synthetic import CROWNED, camera, paint_frame
+from testbed.synthetic import CROWNED, camera, paint_frame
 from worker.calibration.geometry.camera import Camera
 
 SIZE = (384, 216)

@@ -10,7 +10,7 @@ import av
 import numpy as np
 from numpy.typing import NDArray
 
-from tests.worker.calibration.synthetic import pair, pair_frames
+from testbed.synthetic import pair, pair_frames
 from worker.calibration.detection.frame_fusion import Sway
 from worker.calibration.geometry.camera import Array, Camera
 

@@ -6,8 +6,8 @@ import time
 import numpy as np
 import pytest
 
-from tests.rtsp import encode, filming, has_server
-from tests.worker.calibration.synthetic import PITCH, camera
+from testbed.rtsp import encode, filming, has_server
+from testbed.synthetic import PITCH, camera
 from tests.worker.video.numbered_pictures import COUNT, SIZE, number_shown, picture_of
 from worker.calibration.stitching.photometry import NEUTRAL
 from worker.calibration.stitching.views import ViewChoice

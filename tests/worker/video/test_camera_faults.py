@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from tests.rtsp import encode, filming, has_server
-from tests.worker.calibration.synthetic import CROWNED, moved, paint_markings, pair_frames
+from testbed.rtsp import encode, filming, has_server
+from testbed.synthetic import CROWNED, moved, paint_markings, pair_frames
 from tests.worker.video.test_live_tracking import TRUE, Tracking, turned_deg
 from worker.video import clips, live_tracking
 

@@ -12,8 +12,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from tests.ports import free_port
-from tests.worker.calibration.synthetic import CROWNED, moved, pair
+from testbed.ports import free_port
+from testbed.synthetic import CROWNED, moved, pair
 from tests.worker.video.shaking import COUNT, film_shaking, turn
 from worker.calibration.geometry import derivatives
 from worker.calibration.geometry.rotation import rotation_angles_deg

@@ -7,9 +7,9 @@ import threading
 
 import pytest
 
+from testbed.running import venue
+from testbed.synthetic import CROWNED, pair
 from tests.e2e.commands import esc_here
-from tests.e2e.running import venue
-from tests.worker.calibration.synthetic import CROWNED, pair
 from tests.worker.certificates import certificate
 from tests.worker.sources.streaming_camera import ASKS, SIZE, Stranger, StreamingCamera
 from worker.video.clips import Clip

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
-from tests.worker.calibration.synthetic import moved
+from testbed.synthetic import moved
 from tests.worker.video.filming import PITCH, cameras, frame_at
 from worker.calibration.stitching.panorama import BACKDROP, panorama
 from worker.calibration.stitching.photometry import Light

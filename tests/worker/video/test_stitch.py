@@ -13,9 +13,9 @@ import cv2
 import numpy as np
 import pytest
 
-from tests.disks import filled, may_mount, small_disk
-from tests.e2e.running import wait_for
-from tests.ports import free_port, is_listened_on
+from testbed.disks import filled, may_mount, small_disk
+from testbed.ports import free_port, is_listened_on
+from testbed.running import wait_for
 from tests.worker.video.filming import LEFT, PITCH, RIGHT, cameras, film, frame_at, frames_of
 from worker.calibration.stitching.panorama import BACKDROP, panorama
 from worker.calibration.stitching.photometry import NEUTRAL

@@ -5,7 +5,7 @@ import time
 import numpy as np
 import pytest
 
-from tests.rtsp import encode, filming, has_server
+from testbed.rtsp import encode, filming, has_server
 from tests.worker.video.numbered_pictures import number_shown, picture_of
 from worker.video.clips import Clip
 from worker.video.stream_clock import Lateness

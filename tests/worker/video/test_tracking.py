@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.worker.calibration.synthetic import CROWNED, moved, pair
+from testbed.synthetic import CROWNED, moved, pair
 from tests.worker.video.filming import frames_of
 from tests.worker.video.shaking import COUNT, film_shaking, turn
 from worker.calibration.geometry import derivatives

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fields.shapes import COLOURS
-from tests.worker.calibration.synthetic import CROWNED, pair, pair_markings
+from testbed.synthetic import CROWNED, pair, pair_markings
 from worker.calibration.detection.contrast import BLUE, GREEN, LUMA, RED, Channels, possible_signs
 from worker.calibration.detection.evidence import evidence_of
 from worker.calibration.detection.frame_fusion import Sway

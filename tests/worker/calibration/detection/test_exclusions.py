@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from fields.template import load
+from testbed.synthetic import PITCH, camera, paint_markings
 from tests.worker.calibration.sights import grey_lines
-from tests.worker.calibration.synthetic import PITCH, camera, paint_markings
 from worker.calibration.detection.evidence import evidence_of
 from worker.calibration.detection.exclusions import left_out
 from worker.calibration.diagnostics.overlap import overlap_of

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from tests.worker.calibration.synthetic import BARREL, CROWNED, camera, paint_frame
+from testbed.synthetic import BARREL, CROWNED, camera, paint_frame
 from worker.calibration.detection.contrast import GREEN, Channels
 from worker.calibration.detection.frame_fusion import Sway, median, sways
 from worker.calibration.geometry.camera import Pose

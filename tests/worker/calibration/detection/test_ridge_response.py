@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.worker.calibration.synthetic import CROWNED, moved, pair, pair_markings
+from testbed.synthetic import CROWNED, moved, pair, pair_markings
 from worker.calibration.detection.contrast import Channels
 from worker.calibration.detection.ridge_response import ridge_response
 from worker.calibration.geometry.camera import inside

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from service.settings import MODEL_BESIDE_THE_CODE
-from tests.worker.calibration.synthetic import CROWNED, camera, pair_frames
+from testbed.synthetic import CROWNED, camera, pair_frames
 from worker.calibration.detection.segmentation import (
     REGION_PX,
     Region,

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from models.training.pitches.render import Conditions, render_frame
+from testbed import spoiling
+from testbed.synthetic import PITCH, camera, moved
 from tests.scenes import unposed
-from tests.worker.calibration.detection import spoiling
-from tests.worker.calibration.synthetic import PITCH, camera, moved
 from worker.calibration.detection.view_condition import look_at
 from worker.calibration.geometry.camera import Pose
 from worker.calibration.geometry.field import Field

@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from tests.worker.calibration.synthetic import CROWNED, camera, moved, paint_frame, pair, pair_frames
+from testbed.synthetic import CROWNED, camera, moved, paint_frame, pair, pair_frames
 from worker.calibration.detection.contrast import Channels
 from worker.calibration.detection.line_measurement import measure_lines
 from worker.calibration.diagnostics.line_registration import MeasuredLines, register_lines

@@ -6,8 +6,8 @@ from functools import cache
 import numpy as np
 import pytest
 
+from testbed.synthetic import PITCH, camera, moved, paint_markings
 from tests.worker.calibration.sights import grey_lines
-from tests.worker.calibration.synthetic import PITCH, camera, moved, paint_markings
 from worker.calibration.diagnostics.markings import MarkingReport, direction_of, in_words, report_markings
 from worker.calibration.geometry.field import FOOTBALL, Field
 from worker.calibration.refinement.refine import Observations, evaluate_poses, refine

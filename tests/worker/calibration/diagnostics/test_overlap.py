@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.worker.calibration.synthetic import CROWNED, moved, pair, pair_markings
+from testbed.synthetic import CROWNED, moved, pair, pair_markings
 from worker.calibration.diagnostics.overlap import overlap_of
 
 

@@ -12,8 +12,8 @@ import pytest
 from numpy.typing import NDArray
 
 from fields.template import load
+from testbed.synthetic import CROWNED, PITCH, camera, moved, paint_markings, pair
 from tests.scenes import apart, narrow_overlap
-from tests.worker.calibration.synthetic import CROWNED, PITCH, camera, moved, paint_markings, pair
 from worker.calibration.diagnostics.registration import (
     PIXEL_M,
     Registration,
@@ -160,7 +160,7 @@ def test_noise_is_no_marking() -> None:
 def test_the_number_of_threads_changes_no_digit() -> None:
     program = (
         "import sys, cv2; cv2.setNumThreads(int(sys.argv[1]))\n"
-        "from tests.worker.calibration.synthetic import *\n"
+        "from testbed.synthetic import *\n"
         "from worker.calibration.diagnostics.registration import register_pair\n"
         "left, right = pair()\n"
         "wrong = moved(right, rotation=(0.002, 0.001, 0.0))\n"

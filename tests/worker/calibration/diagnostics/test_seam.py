@@ -6,8 +6,8 @@ from functools import cache
 import numpy as np
 import pytest
 
+from testbed.synthetic import CROWNED, moved, pair
 from tests.worker.calibration.sights import pair_observed
-from tests.worker.calibration.synthetic import CROWNED, moved, pair
 from worker.calibration.diagnostics.seam import measure_seam
 from worker.calibration.refinement.refine import evaluate_poses
 

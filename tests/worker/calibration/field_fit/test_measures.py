@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from fields.template import Template, load
-from tests.worker.calibration.sights import observed
-from tests.worker.calibration.synthetic import (
+from testbed.synthetic import (
     BARREL,
     CROWNED,
     PITCH,
@@ -16,6 +15,7 @@ from tests.worker.calibration.synthetic import (
     pair,
     pair_frames,
 )
+from tests.worker.calibration.sights import observed
 from tests.worker.calibration.test_calibrate import white_on_green
 from worker.calibration.field_fit.measures import fit_field, fit_measures
 from worker.calibration.geometry.field import Field

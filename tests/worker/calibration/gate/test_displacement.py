@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from testbed.synthetic import BARREL, PITCH, camera
 from tests.scenes import unposed
-from tests.worker.calibration.gate.test_quality import good
-from tests.worker.calibration.synthetic import BARREL, PITCH, camera
+from tests.worker.calibration.gate.good_result import good
 from worker.calibration.gate.displacement import farthest_place, measure_displacement, sight_axes
 from worker.calibration.geometry import derivatives
 from worker.calibration.refinement.uncertainty import Deviation, Sigma

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from testbed import synthetic
+from testbed.synthetic import PITCH, moved, paint_markings
 from tests.scenes import row
-from tests.worker.calibration import synthetic
-from tests.worker.calibration.synthetic import PITCH, moved, paint_markings
 from worker.calibration.detection.evidence import Evidence
 from worker.calibration.diagnostics.registration import Response
 from worker.calibration.gate.pairs import CameraResponse, Pair, compare_pairs, find_contradictions, stitch_error_px

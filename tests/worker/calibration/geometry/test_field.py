@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fields.template import Template, load
-from tests.worker.calibration.synthetic import CROWNED, PITCH
+from testbed.synthetic import CROWNED, PITCH
 from worker.calibration.geometry.field import Field, resample
 
 pytestmark = pytest.mark.slow

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.worker.calibration.synthetic import CROWNED, PITCH, pair
+from testbed.synthetic import CROWNED, PITCH, pair
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.ground_view import ground_grid, ground_view
 from worker.calibration.geometry.lens import Intrinsics

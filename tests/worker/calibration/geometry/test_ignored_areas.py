@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from testbed.synthetic import CROWNED, pair, pair_frames, pair_markings
 from tests.worker.calibration.sights import pair_observed
-from tests.worker.calibration.synthetic import CROWNED, pair, pair_frames, pair_markings
 from worker.calibration.detection.contrast import Channels
 from worker.calibration.detection.evidence import evidence_of
 from worker.calibration.detection.exclusions import left_out, of_use

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tests.benchmarks.nights.simulated import SHARED_PX, Installation, Painted, SimulatedSight
+from testbed.simulated_nights import SHARED_PX, Installation, Painted, SimulatedSight
 from worker.calibration.detection.line_measurement import Measurements
 from worker.calibration.gate.quality import CameraResult
 from worker.calibration.geometry.camera import Camera, Pose

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.benchmarks.nights.simulated import SimulatedSight
+from testbed.simulated_nights import SimulatedSight
 from tests.worker.calibration.memory.nights import LINES, PITCH, box_camera, job, measured, painted
 from worker.calibration.geometry.derivatives import moved
 from worker.calibration.geometry.parameters import with_focal_length

@@ -5,8 +5,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from tests.worker.calibration.synthetic import CROWNED
-from tests.worker.calibration.test_calibrate import frames, outdated, white_on_green
+from testbed.synthetic import CROWNED
+from tests.worker.calibration.outdated_pair import frames, outdated, white_on_green
 from worker.calibration.paper.calibrate import PRESETS, calibrate_by_paper
 from worker.calibration.records import Options, Recorder
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.worker.calibration.synthetic import CROWNED, moved, pair, pair_markings
+from testbed.synthetic import CROWNED, moved, pair, pair_markings
 from worker.calibration.paper.ground_objective import BROAD, NARROW, GroundObjective
 from worker.calibration.search.genome import genome_of
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from tests.demo.render import outdated
-from tests.worker.calibration.synthetic import CROWNED, pair, pair_markings
+from demo.render import outdated
+from testbed.synthetic import CROWNED, pair, pair_markings
 from worker.calibration.geometry.rotation import rotation_angles_deg
 from worker.calibration.paper.search import ON_THE_GROUND, search_on_ground
 from worker.calibration.search.search import Strategy

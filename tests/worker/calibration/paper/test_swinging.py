@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.worker.calibration.synthetic import pair
+from testbed.synthetic import pair
 from worker.calibration.geometry.camera import Pose
 from worker.calibration.paper.swinging import from_swinging, looked_at, swinging
 from worker.calibration.search.genome import genome_of, with_genome

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.benchmarks.nights.simulated import SHARED_PX, Painted, SimulatedSight
+from testbed.simulated_nights import SHARED_PX, Painted, SimulatedSight
 from tests.worker.calibration.memory.nights import LINES, PITCH, box_camera
 from worker.calibration.geometry.derivatives import moved
 from worker.calibration.geometry.far_marking import far_marking_shift_m

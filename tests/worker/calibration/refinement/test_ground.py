@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fields.template import TURF_M, load
-from tests.benchmarks.nights.simulated import Painted, SimulatedSight
+from testbed.simulated_nights import Painted, SimulatedSight
 from worker.calibration.geometry.camera import Camera, Pose
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.ground import Ground

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from testbed.synthetic import CROWNED, camera
 from tests.worker.calibration.geometry.differences import assert_alike
 from tests.worker.calibration.refinement.test_uncertainty import measured
-from tests.worker.calibration.synthetic import CROWNED, camera
 from worker.calibration.detection.line_measurement import PAINT_M
 from worker.calibration.geometry.derivatives import POSE_NUMBERS
 from worker.calibration.geometry.ground import Ground

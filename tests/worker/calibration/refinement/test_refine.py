@@ -6,9 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from tests.scenes import lone_line
-from tests.worker.calibration.sights import observed, pair_observed
-from tests.worker.calibration.synthetic import (
+from testbed.synthetic import (
     BARREL,
     CROWNED,
     ground_behind,
@@ -17,6 +15,8 @@ from tests.worker.calibration.synthetic import (
     pair_frames,
     pair_markings,
 )
+from tests.scenes import lone_line
+from tests.worker.calibration.sights import observed, pair_observed
 from worker.calibration.detection.contrast import Channels
 from worker.calibration.detection.line_matching import expected_profiles, sliding_correlation
 from worker.calibration.detection.line_measurement import LineProfiles, measure_lines

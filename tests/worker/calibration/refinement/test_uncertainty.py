@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fields.template import load
-from tests.worker.calibration.synthetic import camera, moved
+from testbed.synthetic import camera, moved
 from worker.calibration.detection.evidence import Evidence
 from worker.calibration.detection.line_measurement import Measurements
 from worker.calibration.geometry.field import Field

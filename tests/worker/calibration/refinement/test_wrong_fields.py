@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.benchmarks.nights.simulated import Painted, SimulatedSight
-from tests.worker.calibration.synthetic import CROWNED as PITCH
-from tests.worker.calibration.synthetic import camera
+from testbed.simulated_nights import Painted, SimulatedSight
+from testbed.synthetic import CROWNED as PITCH
+from testbed.synthetic import camera
 from worker.calibration.geometry.parameters import FieldSkew
 from worker.calibration.refinement.diagnosis import find_suspicions
 from worker.calibration.refinement.refine import refine

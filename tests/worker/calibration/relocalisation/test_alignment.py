@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.worker.calibration.synthetic import PITCH, camera, paint_frame
-from tests.worker.calibration.test_calibrate import white_on_green
+from testbed.synthetic import PITCH, camera, paint_frame
+from tests.worker.calibration.outdated_pair import white_on_green
 from worker.calibration.detection.segmentation import Region
 from worker.calibration.geometry.rotation import rotation_matrices
 from worker.calibration.relocalisation.agreement import HALF_WIDTH_PX, agreement, straightened

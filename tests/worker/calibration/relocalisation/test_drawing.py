@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.worker.calibration.synthetic import PITCH
+from testbed.synthetic import PITCH
 from worker.calibration.relocalisation.drawing import AIMED_AT, HIGHEST_M, LOWEST_M, draw
 from worker.calibration.relocalisation.field_map import FieldMap
 

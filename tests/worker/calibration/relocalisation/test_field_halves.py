@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.worker.calibration.synthetic import PITCH, camera, paint_frame, worn
+from testbed.synthetic import PITCH, camera, paint_frame, worn
 from worker.calibration.relocalisation.field_halves import choose_sides, side_of
 from worker.calibration.relocalisation.relocalise import twin
 from worker.calibration.relocalisation.shared_ground import SharedGround

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from fields.template import Template
-from tests.worker.calibration.synthetic import PITCH
-from tests.worker.calibration.test_sports import field
+from testbed.synthetic import PITCH
+from tests.worker.calibration.sports import field
 from worker.calibration.geometry.field import Field
 from worker.calibration.relocalisation.field_map import FieldMap
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.worker.calibration.synthetic import PITCH, camera, paint_markings
+from testbed.synthetic import PITCH, camera, paint_markings
 from worker.calibration.relocalisation.paint import Paint, share
 
 TRUTH = camera("one", (0.0, -48.0, 12.0), (-10.0, -8.0))

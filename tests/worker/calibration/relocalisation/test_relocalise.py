@@ -6,9 +6,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-from tests.worker.calibration.synthetic import BARREL, PITCH, camera, paint_frame
-from tests.worker.calibration.test_calibrate import white_on_green
-from tests.worker.calibration.test_sports import field
+from testbed.synthetic import BARREL, PITCH, camera, paint_frame
+from tests.worker.calibration.outdated_pair import white_on_green
+from tests.worker.calibration.sports import field
 from worker.calibration.detection.contrast import Channels
 from worker.calibration.detection.evidence import Evidence
 from worker.calibration.detection.segmentation import Region

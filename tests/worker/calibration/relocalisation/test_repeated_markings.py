@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from tests.worker.calibration.synthetic import camera
-from tests.worker.calibration.test_sports import field
+from testbed.synthetic import camera
+from tests.worker.calibration.sports import field
 from worker.calibration.relocalisation.field_map import FieldMap
 from worker.calibration.relocalisation.hypotheses import Hypotheses
 from worker.calibration.relocalisation.repeated_markings import slid_along_field

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.worker.calibration.synthetic import PITCH, camera, moved, paint_frame, pair, worn
+from testbed.synthetic import PITCH, camera, moved, paint_frame, pair, worn
 from worker.calibration.detection.evidence import Evidence
 from worker.calibration.diagnostics.overlap import Overlap
 from worker.calibration.refinement.uncertainty import Sigma

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.worker.calibration.synthetic import PITCH, camera, moved, mown, paint_frame, pair, worn
+from testbed.synthetic import PITCH, camera, moved, mown, paint_frame, pair, worn
 from worker.calibration.relocalisation.relocalise import twin
 from worker.calibration.relocalisation.shared_ground import SharedGround
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.worker.calibration.synthetic import camera
+from testbed.synthetic import camera
 from worker.calibration.relocalisation.relocalise import sees_all_of_its_frame
 from worker.calibration.relocalisation.sought import (
     BENDS,

@@ -3,7 +3,7 @@
 import cv2
 import numpy as np
 
-from tests.worker.calibration.synthetic import CROWNED, pair
+from testbed.synthetic import CROWNED, pair
 from worker.calibration.rendering.layers import mask_layer, new_layer, seam_layer, stored_layer
 from worker.calibration.rendering.stitched_pictures import stitched
 from worker.calibration.stitching.views import ViewChoice, chosen_view

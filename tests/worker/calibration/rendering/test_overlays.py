@@ -6,8 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from tests.scenes import unposed
-from tests.worker.calibration.synthetic import (
+from testbed.synthetic import (
     BARREL,
     CROWNED,
     PITCH,
@@ -17,6 +16,7 @@ from tests.worker.calibration.synthetic import (
     pair,
     pair_frames,
 )
+from tests.scenes import unposed
 from worker.calibration.diagnostics.markings import MarkingReport
 from worker.calibration.geometry.camera import Pose
 from worker.calibration.rendering.markings import ELSEWHERE_COLOUR, MISSING_COLOUR, NEW_COLOUR, worst

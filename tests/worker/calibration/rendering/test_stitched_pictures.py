@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tests.scenes import row, unposed
-from tests.worker.calibration.synthetic import (
+from testbed.synthetic import (
     CROWNED,
     GRASS,
     PITCH,
@@ -16,6 +15,7 @@ from tests.worker.calibration.synthetic import (
     pair,
     pair_frames,
 )
+from tests.scenes import row, unposed
 from worker.calibration.geometry.camera import Array, Camera, Frame, Pose, inside
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.rotation import rotation_matrices, rotation_vectors

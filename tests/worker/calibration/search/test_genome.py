@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tests.worker.calibration.synthetic import pair
+from testbed.synthetic import pair
 from worker.calibration.search.genome import genome_of, with_genome
 
 

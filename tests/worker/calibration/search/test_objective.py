@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.worker.calibration.synthetic import CROWNED, moved, pair, pair_markings
+from testbed.synthetic import CROWNED, moved, pair, pair_markings
 from worker.calibration.detection.line_profile import blurred_line
 from worker.calibration.search.genome import genome_of
 from worker.calibration.search.objective import BlurredResponse, Objective

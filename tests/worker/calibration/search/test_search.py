@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.worker.calibration.synthetic import CROWNED, moved, pair, pair_markings
+from testbed.synthetic import CROWNED, moved, pair, pair_markings
 from worker.calibration.search.search import COARSE_TO_FINE, PATIENCE, Strategy, search
 
 LEVELS = len(COARSE_TO_FINE)

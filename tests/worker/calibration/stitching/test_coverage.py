@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from testbed.synthetic import PITCH, pair
 from tests import scenes
-from tests.worker.calibration.synthetic import PITCH, pair
 from worker.calibration.stitching.coverage import unseen_part
 from worker.calibration.stitching.panorama import panorama
 from worker.calibration.stitching.views import ViewChoice, chosen_view

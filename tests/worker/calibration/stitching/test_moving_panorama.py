@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.worker.calibration.synthetic import CROWNED, pair
+from testbed.synthetic import CROWNED, pair
 from worker.calibration.geometry.derivatives import moved
 from worker.calibration.stitching.moving_panorama import STILL_BORDER, VIEW_BORDER, MovingPanorama
 from worker.calibration.stitching.panorama import panorama

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.worker.calibration.synthetic import CROWNED, pair, pair_frames
+from testbed.synthetic import CROWNED, pair, pair_frames
 from worker.calibration.stitching.panorama import panorama
 from worker.calibration.stitching.photometric_alignment import evened_out
 from worker.calibration.stitching.photometry import NEUTRAL, Light, squared_radius

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.worker.calibration.synthetic import CROWNED, PITCH, pair
+from testbed.synthetic import CROWNED, PITCH, pair
 from worker.calibration.geometry.camera import Pose
 from worker.calibration.geometry.rotation import rotation_matrices, rotation_vectors
 from worker.calibration.stitching.views import LevelView, ViewChoice, chosen_view

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
-from tests.worker.calibration.synthetic import CROWNED, moved, pair, pair_frames
+from testbed.synthetic import CROWNED, moved, pair, pair_frames
 from worker.calibration.detection.contrast import Channels
 from worker.calibration.detection.frame_fusion import Sway
 from worker.calibration.geometry import derivatives

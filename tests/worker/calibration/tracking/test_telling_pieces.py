@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tests.worker.calibration.synthetic import CROWNED, pair
+from testbed.synthetic import CROWNED, pair
 from worker.calibration.geometry.derivatives import pixel_jacobian
 from worker.calibration.geometry.visibility import VisibleLines
 from worker.calibration.tracking.telling_pieces import most_telling

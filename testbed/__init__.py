@@ -1,0 +1,1 @@
+"""Services in real processes, their homes, stub cameras and rendered venues, which tests and benchmarks share."""

@@ -1,0 +1,216 @@
+"""Start processes of `service.cli` by fork from a parent that has imported everything: imports are most of a start.
+
+Each is a real process and a child of the one that asked, as `subprocess.Popen` makes them: the warm parent forks twice,
+and whoever asked is the nearest subreaper (prctl(2)) of what the first fork leaves behind. What a process reads before
+the first line of `service.cli` it has of the warm parent: who tests that, starts it cold. Elsewhere than on Linux, and
+with another interpreter or other paths of modules, every start is cold.
+"""
+
+import array
+import atexit
+import ctypes
+import functools
+import gc
+import importlib
+import importlib.util
+import json
+import os
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+PR_SET_CHILD_SUBREAPER = 36
+# All that a service, a worker or a command loads sooner or later.
+IMPORTED = (
+    "service.cli.main",
+    "service.cli.serve",
+    "service.cli.worker",
+    "service.cli.venues",
+    "psycopg",
+    "alembic.command",
+)
+# What the interpreter reads as it starts.
+OF_THE_INTERPRETER = "PYTHON"
+LONGEST_REQUEST = 1 << 20
+# Workers of each `esc up`: the one that it keeps, and another for when that is killed.
+SPARE_WORKERS = 2
+
+
+class Popen(subprocess.Popen):
+    """`subprocess.Popen`, which has commands of `service.cli` forked from the warm parent."""
+
+    def _execute_child(self, args, *how):
+        cwd, environment, (stdin, _, _, stdout, _, stderr) = how[4], how[5], how[9:15]
+        arguments = arguments_of(args, environment)
+        if arguments is None:
+            return super()._execute_child(args, *how)
+        files = [given if given != -1 else own for own, given in enumerate((stdin, stdout, stderr))]
+        self.pid = warm_parent().fork(arguments, str(cwd or Path.cwd()), dict(environment or os.environ), files)
+        self._child_created = True
+        return self._close_pipe_fds(*how[9:15])
+
+
+def arguments_of(command, environment) -> list[str] | None:
+    """Arguments of `service.cli` in a command; None if the warm parent cannot stand in for its interpreter."""
+    environment = os.environ if environment is None else environment
+    if sys.platform != "linux" or isinstance(command, str):
+        return None
+    program, *arguments = map(str, command)
+    arguments = arguments[1:] if arguments[:1] == ["-P"] else arguments
+    same = of_the_interpreter(environment) == of_the_interpreter(os.environ)
+    return arguments[2:] if program == sys.executable and arguments[:2] == ["-m", "service.cli"] and same else None
+
+
+def of_the_interpreter(environment) -> dict[str, str]:
+    return {name: value for name, value in environment.items() if name.startswith(OF_THE_INTERPRETER)}
+
+
+@functools.cache
+def warm_parent() -> "WarmParent":
+    """Warm parent of this process, which ends with it."""
+    return WarmParent()
+
+
+class WarmParent:
+    """The end of the socket that asks."""
+
+    def __init__(self) -> None:
+        ctypes.CDLL(None).prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
+        self._asking = threading.Lock()
+        self._socket, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        command = [sys.executable, "-m", "testbed.warm", str(theirs.fileno()), str(os.getpid())]
+        with theirs:
+            self._process = subprocess.Popen(
+                command, cwd=Path(__file__).parents[1], stdin=subprocess.DEVNULL, pass_fds=[theirs.fileno()]
+            )
+        atexit.register(self._end)
+
+    def fork(self, arguments: list[str], folder: str, environment: dict[str, str], files: list[int]) -> int:
+        """The id of a child of this process, which runs `service.cli` with these files as its first three."""
+        request = json.dumps([arguments, folder, environment]).encode()
+        rights = (socket.SOL_SOCKET, socket.SCM_RIGHTS, array.array("i", files))
+        with self._asking:
+            self._socket.sendmsg([request], [rights])
+            answer = self._socket.recv(LONGEST_REQUEST)
+        assert answer, "the warm parent has ended"
+        return int(answer)
+
+    def _end(self) -> None:
+        self._socket.close()
+        self._process.wait()
+
+
+class SpareWorker:
+    """A child that was forked before its parent had threads, and waits to be the worker of `esc up`."""
+
+    def __init__(self, elder: Sequence["SpareWorker"]) -> None:
+        """`elder`: those that wait already, whose pipes are none of its business."""
+        reader, self._writer = os.pipe()
+        self.pid: int | None = os.fork()
+        if self.pid:
+            os.close(reader)
+            return
+        for writer in (self._writer, *(one._writer for one in elder)):
+            os.close(writer)
+        with os.fdopen(reader, "rb") as pipe:
+            asked = pipe.read()
+        if not asked:
+            os._exit(0)
+        os.setsid()
+        with Path(os.devnull).open("rb") as nothing:
+            os.dup2(nothing.fileno(), 0)
+        become(*json.loads(asked))
+
+    def begin(self, arguments: list[str], folder: str, environment: dict[str, str]) -> int | None:
+        """Start the worker, and return its process id."""
+        with os.fdopen(self._writer, "wb") as pipe:
+            pipe.write(json.dumps([arguments, folder, environment]).encode())
+        return self.pid
+
+
+def spare_workers() -> list[SpareWorker]:
+    """Start the spare workers of this process; each of them goes on from here as a worker, and gets an empty list."""
+    spare: list[SpareWorker] = []
+    while len(spare) < SPARE_WORKERS:
+        spare.append(SpareWorker(spare))
+        if not spare[-1].pid:
+            return []
+    return spare
+
+
+def kept_by(waiting: list[SpareWorker]) -> type[subprocess.Popen]:
+    """Return the `Popen` by which `esc up` starts its worker: the spare ones first, later ones as always."""
+
+    class Kept(subprocess.Popen):
+        def _execute_child(self, args, *how):
+            arguments = arguments_of(args, how[5])
+            if not waiting or not arguments or arguments[0] != "worker":
+                return super()._execute_child(args, *how)
+            self.pid = waiting.pop(0).begin(arguments, str(how[4] or Path.cwd()), dict(how[5]))
+            self._child_created = True
+            return self._close_pipe_fds(*how[9:15])
+
+    return Kept
+
+
+def become(arguments: list[str], folder: str, environment: dict[str, str]) -> None:
+    """Take on arguments, folder and environment of another process."""
+    os.environ.clear()
+    os.environ.update(environment)
+    time.tzset()
+    os.chdir(folder)
+    # As `python -m service.cli` has them.
+    program = importlib.util.find_spec("service.cli.__main__")
+    sys.modules["__main__"].__package__ = program.parent
+    sys.argv[:] = [program.origin, *arguments]
+
+
+def serve(requests: socket.socket, asking: int) -> None:
+    """Fork a process for each request; returns in each of them, with what it shall be in place."""
+    while True:
+        request, ancillary, _, _ = requests.recvmsg(LONGEST_REQUEST, socket.CMSG_SPACE(3 * array.array("i").itemsize))
+        if not request:
+            os._exit(0)
+        files = array.array("i")
+        for _, _, data in ancillary:
+            files.frombytes(data)
+        between = os.fork()
+        if between:
+            for file in files:
+                os.close(file)
+            os.waitpid(between, 0)
+            continue
+        if os.fork():
+            os._exit(0)
+        # Only now can whoever asked wait for this process: before, it is no child of theirs.
+        while os.getppid() != asking:
+            time.sleep(0.001)
+        requests.send(str(os.getpid()).encode())
+        requests.close()
+        for number, file in enumerate(files):
+            os.dup2(file, number)
+            os.close(file)
+        return become(*json.loads(request))
+
+
+def main() -> None:
+    number, asking = map(int, sys.argv[1:])
+    for module in IMPORTED:
+        importlib.import_module(module)
+    assert len([*Path("/proc/self/task").iterdir()]) == 1, "a thread would be missing in what is forked"
+    gc.collect()
+    gc.freeze()
+    serve(socket.socket(fileno=number), asking)
+    if sys.argv[1:2] == ["up"]:
+        waiting = spare_workers()
+        if waiting:
+            subprocess.Popen = kept_by(waiting)
+    sys.modules["service.cli.main"].main()
+
+
+if __name__ == "__main__":
+    main()
