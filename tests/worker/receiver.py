@@ -4,6 +4,7 @@ import socket
 import ssl
 import threading
 import time
+from base64 import b64encode
 from contextlib import suppress
 from dataclasses import dataclass
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -11,6 +12,9 @@ from pathlib import Path
 
 import pytest
 
+# Settings of a service that may call a receiver of this machine, and signs what it sends.
+SECRET = "whsec_" + b64encode(bytes(32)).decode()
+LOCAL = {"ESC_WEBHOOK_SECRET": SECRET, "ESC_CALLBACK_ALLOW_HTTP": "true", "ESC_CALLBACK_ALLOW_PRIVATE": "true"}
 # What servers say of their own accord, which nobody is to read through the service.
 TELLTALE = (
     b"220 admin console, token=hunter2\r\n\r\n",

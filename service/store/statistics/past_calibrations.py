@@ -58,10 +58,11 @@ class PastCalibrationRepository(Repository):
             return read_each(connection.execute(query), _past)[0]
 
     def newest_result(self, venue: str) -> str | None:
-        """Return the newest calibration of a venue that has a result, accepted or not."""
+        """Return the id of the newest calibration of a venue that has a result, accepted or not."""
         query = _newest_calibrations(venue, j.id).where(j.result.is_not(None)).limit(1)
         with reading(self._engine) as connection:
-            return connection.scalar(query)
+            job: str | None = connection.scalar(query)
+            return job
 
     def last_taken(self, venue: str) -> str | None:
         """Return the last job whose poses a venue took, whose frames and pictures do not expire."""
