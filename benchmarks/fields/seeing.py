@@ -45,7 +45,7 @@ def seen(case: Case, segment: Segment) -> dict:
     names = [marking.name for marking in case.pitch.markings()]
     by_marking = {}
     for number in np.unique(evidence.marking):
-        its = evidence.of(number)
+        its = evidence.for_marking(number)
         by_marking[names[number]] = [float(its.weight.sum()), its.share]
     return {
         **network_figures(case, everywhere > 255 * MARKING),

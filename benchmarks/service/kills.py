@@ -24,7 +24,8 @@ from subprocess import Popen
 import httpx
 import sqlalchemy as sa
 
-from benchmarks.service.stage import EMBEDDED, SERVERS, SURE, homes, service, spread
+from benchmarks.printing import spread
+from benchmarks.service.stage import EMBEDDED, SERVERS, SURE, homes, service
 from service.serving import MIN_HEALTHY_UPTIME_S
 from service.store import tables
 from testbed.books import settle
