@@ -31,7 +31,7 @@ OPEN = {
     "/docs/LICENSE.txt",
 }
 # The way to sign in, and what it is drawn with.
-OPEN |= {"/ui/documents/{name}", "/favicon.ico", "/ui/static/{of_edition}/{path:path}", "/ui/sign-in", "/ui/sign-out"}
+OPEN |= {"/ui/documents/{name}", "/favicon.ico", "/ui/static/{version}/{path:path}", "/ui/sign-in", "/ui/sign-out"}
 NEEDED = {"GET": "read", "POST": "calibrate", "PUT": "admin", "PATCH": "admin", "DELETE": "admin"}
 # Pages that show nothing but how to change something, a question that takes a body, and what changes no venue.
 OTHERWISE = {
@@ -108,7 +108,7 @@ def test_every_route_says_who_may_call_it_and_means_it(guarded, key, routes):
             number=1,
             kind="not-found",
             reason="lines",
-            of_edition="0",
+            version="0",
             path="page.css",
             name="refused",
         )

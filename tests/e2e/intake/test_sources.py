@@ -119,20 +119,6 @@ def test_a_password_among_the_parameters_is_shown_to_nobody_and_still_reaches_th
     assert not [secret for secret in ("hunter2", "s3cret") if secret in (service.data / "log").read_text()]
 
 
-def test_a_password_in_a_venue_of_an_older_release_is_hidden_and_kept(service, camera, name):
-    put(service, name, left=camera.url("/snap?x=1"), right=camera.url("/ok"))
-    v = tables.venues.c
-    with service.database() as connection:
-        document = connection.scalar(sa.select(v.document).where(v.id == name))
-        document["cameras"][0]["source"] = camera.url("/snap?usr=admin&pwd=hunter2")
-        connection.execute(sa.update(tables.venues).where(v.id == name).values(document=document))
-    got = service.http.get(f"/venues/{name}")
-    assert got.json()["cameras"][0]["source"] == camera.url("/snap?usr=***&pwd=***")
-    for _ in range(2):
-        assert service.http.get(f"/venues/{name}/cameras/left/snapshot").content == png()
-        assert service.http.put(f"/venues/{name}", json=got.json()).status_code == 200
-
-
 def test_a_parameter_that_nobody_knows_is_refused_by_its_name(service, camera, name):
     document = with_sources(name, left=camera.url("/snap?token=***"))
     refused = service.http.put(f"/venues/{name}", json=document)

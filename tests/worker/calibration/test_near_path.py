@@ -7,7 +7,7 @@ import pytest
 
 from testbed.synthetic import CROWNED, GRASS, moved, paint_frame, pair, pair_frames
 from tests.worker.calibration.outdated_pair import WIND, white_on_green
-from worker.calibration import solve as settling
+from worker.calibration import steps
 from worker.calibration.calibrate import calibrate
 from worker.calibration.detection.segmentation import OVERVIEW_WIDTH_PX
 from worker.calibration.gate.quality import MUCH_UNEXPECTED
@@ -98,14 +98,14 @@ def test_only_the_camera_that_was_turned_is_searched_for():
     frames = {one.id: [frame] for one, frame in zip(pair(), pair_frames(), strict=True)}
     left, right = pair()
     searched: list[str] = []
-    real = settling.search
+    real = steps.search
 
     def watched(pitch, cameras, *others):
         searched.extend(camera.id for camera in cameras)
         return real(pitch, cameras, *others)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(settling, "search", watched)
+        patch.setattr(steps, "search", watched)
         found = calibrate(CROWNED, [moved(left, *WIND), moved(right, *STORM)], frames, white_on_green, Options(seed=5))
     assert searched == ["right"]
     assert (found.path, found.verdict) == ("wide", "accepted")

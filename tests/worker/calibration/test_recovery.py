@@ -288,7 +288,7 @@ def test_of_a_camera_in_the_dark_it_is_asked_whether_a_third_of_its_frame_is_lig
         observed=SimpleNamespace(views=[noisy("dark", brightness=8.0, noise=6.0)]),
     )
     observer = SimpleNamespace(frames={"left": (frame,)})
-    assert recovery._may_be_of_what_lies_beside(problem, 0, observer) == is_doubted
+    assert recovery._refusal_may_concern_wrong_region(problem, 0, observer) == is_doubted
 
 
 def noisy(cause, brightness, noise):
@@ -304,7 +304,7 @@ def test_what_lies_in_the_dark_is_looked_for_where_noise_does_not_hide_it(bright
         observed=SimpleNamespace(views=[noisy("dark", brightness, noise)]),
     )
     observer = SimpleNamespace(frames={"left": (np.full((200, 320, 3), int(brightness), np.uint8),)})
-    assert recovery._may_be_of_what_lies_beside(problem, 0, observer) == is_doubted
+    assert recovery._refusal_may_concern_wrong_region(problem, 0, observer) == is_doubted
 
 
 @pytest.mark.parametrize(
@@ -313,11 +313,10 @@ def test_what_lies_in_the_dark_is_looked_for_where_noise_does_not_hide_it(bright
 )
 def test_a_camera_is_lost_by_its_lines_or_by_having_moved_too_far_since_last_night(reason, is_far, is_lost):
     """One whose touchlines were repainted is undetermined where it stands; a search would have it accepted aside."""
-    problem = SimpleNamespace(gate=None)
     result = SimpleNamespace(
-        refusal=Refusal(reason, "words"), moved=SimpleNamespace(beyond=lambda _: is_far), view=SimpleNamespace()
+        refusal=Refusal(reason, "words"), moved=SimpleNamespace(exceeds_limits=is_far), view=SimpleNamespace()
     )
-    assert recovery._is_lost(problem, result) == is_lost
+    assert recovery._is_lost(result) == is_lost
 
 
 def test_a_camera_that_was_knocked_in_the_dusk_is_found_where_noise_does_not_hide_its_lines():

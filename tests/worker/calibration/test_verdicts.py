@@ -14,8 +14,7 @@ from testbed.synthetic import BARREL, CROWNED, camera, moved, paint_frame
 from tests.scenes import chain
 from tests.worker.calibration.outdated_pair import SHIFT, TURN, white_on_green
 from tests.worker.calibration.sports import field
-from worker.calibration import calibrate as engine
-from worker.calibration import solve, wide_path
+from worker.calibration import joint_verdict, steps, wide_path
 from worker.calibration.calibrate import calibrate
 from worker.calibration.gate.pairs import Pair
 from worker.calibration.geometry.camera import Camera
@@ -107,11 +106,11 @@ def test_a_camera_that_the_others_contradict_is_finished_apart_from_them(monkeyp
         finished.append([camera.id for camera in begun])
         return finish(problem, begun, progress)
 
-    finish = solve.refine_and_judge
-    for module in (solve, wide_path):
+    finish = steps.refine_and_judge
+    for module in (steps, wide_path):
         monkeypatch.setattr(module, "refine_and_judge", finishing)
-    monkeypatch.setattr(engine, "compare_pairs", contradicted)
-    monkeypatch.setattr(engine, "measured_by_lines", lambda _, pairs, *__: pairs)
+    monkeypatch.setattr(joint_verdict, "compare_pairs", contradicted)
+    monkeypatch.setattr(joint_verdict, "measured_by_lines", lambda _, pairs, *__: pairs)
     found = run(chain)
     assert verdicts(found) == {"west": True, "middle": True, "east": False}
     assert finished == [["west", "middle", "east"], ["west", "middle"]]

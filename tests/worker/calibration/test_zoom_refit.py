@@ -9,7 +9,7 @@ import pytest
 from testbed.synthetic import CROWNED, camera, moved, paint_frame
 from tests.scenes import plane
 from tests.worker.calibration.outdated_pair import white_on_green
-from worker.calibration import solve, wide_path
+from worker.calibration import steps, wide_path
 from worker.calibration.calibrate import calibrate
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.parameters import with_focal_length
@@ -82,13 +82,13 @@ def test_a_lens_that_may_drift_is_accepted_with_the_focal_length_it_has():
 
 
 def test_the_neighbours_of_a_camera_that_zoomed_are_finished_without_it(monkeypatch):
-    finished, finish = [], solve.refine_and_judge
+    finished, finish = [], steps.refine_and_judge
 
     def finishing(problem, begun, progress):
         finished.append([one.id for one in begun])
         return finish(problem, begun, progress)
 
-    for module in (solve, wide_path):
+    for module in (steps, wide_path):
         monkeypatch.setattr(module, "refine_and_judge", finishing)
     beside = camera("beside", (-8.0, -62.0, 18.0), (4.0, 2.0), focal=1600.0, size=(1280, 720))
     frames = {"tele": [picture()], "beside": [paint_frame(CROWNED, beside)]}

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from testbed.synthetic import CROWNED, pair, pair_frames
-from worker.calibration import solve
+from worker.calibration import steps
 from worker.calibration.detection.contrast import Channels
 from worker.calibration.geometry.camera import Pose
 from worker.calibration.geometry.rotation import rotation_matrices, rotation_vectors
@@ -48,6 +48,6 @@ def test_lines_beside_which_a_finish_ended_are_found_from_there(turned_deg, move
 
 def test_a_finish_that_finds_its_lines_is_not_begun_again(monkeypatch):
     begun = []
-    monkeypatch.setattr(solve, "refine", lambda *given, **named: begun.append(given) or refine(*given, **named))
+    monkeypatch.setattr(steps, "refine", lambda *given, **named: begun.append(given) or refine(*given, **named))
     assert refined_as_in_a_job(displaced(pair()[0], (0.1, 0.1, 0.0), (0.05, 0.0, 0.0))).evidence.agreement > 0.95
     assert len(begun) == 1
