@@ -34,10 +34,9 @@ from service.schemas.addresses import ip_of
 from service.schemas.names import Scope
 from service.schemas.problems import Problem
 from service.settings import Settings
-from service.store.keys import Key, KeyRepository, hash_of
+from service.store.keys import KEY_CACHED_FOR_S, Key, KeyRepository, hash_of
 from service.store.sessions import SessionRepository
 
-KEY_CACHED_FOR_S = 5.0
 COOKIE, TOKEN_HEADER = "esc_session", "X-CSRF-Token"
 USES_WRITTEN_EVERY_S = 60.0
 # Unknown keys and cookies from one address: so many at once, then one every so many seconds.

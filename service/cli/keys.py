@@ -12,14 +12,13 @@ from typing import Annotated
 
 import typer
 
-from service.api.auth import KEY_CACHED_FOR_S
 from service.cli.arguments import Data, Yes, require_yes
 from service.cli.local_database import report_database_errors, require_folders
 from service.cli.printing import FAILED, USAGE, fail, print_note, print_rows
 from service.cli.service_settings import load_settings
 from service.schemas.names import ID_IN_WORDS, ID_PATTERN, Scope
 from service.store.database import connect, migrate, sqlite_file
-from service.store.keys import KeyExists, KeyRepository, old_name
+from service.store.keys import KEY_CACHED_FOR_S, KeyExists, KeyRepository, old_name
 
 OTHER_FOLDER_HINT = "Of a service that has its folder elsewhere, name it: --data, or ESC_DATA."
 UNITS = {"m": timedelta(minutes=1), "h": timedelta(hours=1), "d": timedelta(days=1)}

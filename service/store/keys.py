@@ -17,6 +17,8 @@ from service.store.tables import api_keys
 
 PREFIX = "esc_"
 LONGEST_NAME, OLD = 64, "-old"
+# Seconds for which a service goes on taking a key as it was when it last looked.
+KEY_CACHED_FOR_S = 5.0
 k = api_keys.c
 
 

@@ -9,11 +9,11 @@ from fastapi import APIRouter
 from starlette.requests import HTTPConnection
 from structlog.testing import capture_logs
 
-from service.api.auth import COOKIE, GUESS_EVERY_S, GUESSES, KEY_CACHED_FOR_S, Authenticator, page_token
+from service.api.auth import COOKIE, GUESS_EVERY_S, GUESSES, Authenticator, page_token
 from service.routes.contract.guarded import Guarded
 from service.schemas.problems import Problem
 from service.settings import Settings
-from service.store.keys import KeyRepository, hash_of
+from service.store.keys import KEY_CACHED_FOR_S, KeyRepository, hash_of
 from service.store.sessions import SessionRepository
 from tests.service.api.test_rate_limit import Clock
 
