@@ -22,33 +22,6 @@ from tests.worker.receiver import LOCAL, SECRET, Receiver
 RENDERER = Path(__file__).parents[3] / "docs" / "examples" / "renderer.py"
 
 
-class Stream:
-    """The events of an open stream."""
-
-    def __init__(self, answer: httpx.Response) -> None:
-        assert answer.status_code == 200, answer.read()
-        self.headers = answer.headers
-        self._lines = answer.iter_lines()
-
-    def next(self) -> dict:
-        """The next event: its id, its name and its body."""
-        event = {}
-        for line in self._lines:
-            name, _, value = line.partition(": ")
-            if name:
-                event[name] = value
-            elif "data" in event:
-                return event | {"data": json.loads(event["data"])}
-        raise EOFError
-
-    def until(self, name: str) -> list[dict]:
-        """Events up to the first of a name."""
-        events = [self.next()]
-        while events[-1]["event"] != name:
-            events.append(self.next())
-        return events
-
-
 @in_both_homes
 def test_who_follows_a_venue_is_told_of_its_poses_and_of_whatever_happens(service, name):
     service.venue(name)
