@@ -6,11 +6,13 @@ BIN := $(VENV)/bin
 .PHONY: setup demo test test-fast test-long format check wheel bench bench-find bench-knocked bench-real bench-cost bench-fields bench-segmentation bench-truth bench-service bench-faults bench-hostile bench-rate bench-versions bench-video bench-follow bench-live bench-learned train lock clean
 
 # What runs, without what tests, checks and clips need on top: a third of the size. Compiled where it is first imported.
-$(VENV)/.runtime: docker/requirements.lock pyproject.toml
+$(VENV)/.runtime: docker/requirements.lock requirements.lock pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 14) and "ESC needs Python 3.11, 3.12 or 3.13; try: make PYTHON=python3.12 " or 0)'
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/pip install --quiet --disable-pip-version-check --no-compile --require-hashes -r docker/requirements.lock
-	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --editable .
+	sed -n '/^setuptools==/,/[^\\]$$/p' requirements.lock >$(VENV)/build.lock
+	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r $(VENV)/build.lock
+	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
 	touch $@
 
 demo: $(VENV)/.runtime
@@ -18,7 +20,7 @@ demo: $(VENV)/.runtime
 
 setup: $(VENV)/.installed
 
-$(VENV)/.installed: $(VENV)/.runtime requirements.lock
+$(VENV)/.installed: $(VENV)/.runtime
 	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
 	$(BIN)/python -m compileall -qq $(VENV)/lib || true
 	touch $@
