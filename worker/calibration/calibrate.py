@@ -119,7 +119,7 @@ def _with_proposals(solution: Solution, progress: ProgressReporter) -> Solution:
         return solution
     passed = [replace(one, refusal=None) if n in beyond else one for n, one in enumerate(judged.cameras)]
     together = judge_together(solution.problem, solution.poses.pitch, passed, progress)
-    if any(one.accepted and not two.accepted for one, two in zip(judged.cameras, together.cameras, strict=True)):
+    if not together.accepts_all_of(judged):
         return solution
     knocked = {n: as_knocked(together.cameras[n]) for n in beyond if together.cameras[n].accepted}
     results = [knocked.get(n, one) for n, one in enumerate(judged.cameras)]

@@ -16,7 +16,7 @@ from worker.calibration.gate.pairs import (
     find_contradictions,
     measured_by_lines,
     refusal_by_pairs,
-    stitch_error_px,
+    stitch_error_of,
 )
 from worker.calibration.gate.quality import CameraResult, in_one_sentence, ridge_rejection
 from worker.calibration.geometry.camera import Camera
@@ -42,8 +42,7 @@ def judge_together(
         replace(result, refusal=result.refusal or refusal_by_pairs(result.camera.id, against) or ridge)
         for result in results
     ]
-    accepted = {result.camera.id for result in judged if result.accepted}
-    stitch = stitch_error_px([pair for pair in pairs if not accepted or accepted.issuperset(pair.cameras)])
+    stitch = stitch_error_of(pairs, judged)
     by_id = {result.camera.id: result for result in judged}
     seams = [(pair, measure_seam(pitch, by_id[pair.first], by_id[pair.second])) for pair in pairs]
     return EngineResult(pitch, judged, in_one_sentence(reasons) or None, stitch, progress.timings, pairs=seams)

@@ -125,6 +125,11 @@ class EngineResult:
         reasons = [f"camera {one.camera.id}: {one.rejected_because}" for one in cameras if one.rejected_because]
         return replace(self, cameras=cameras, rejected_because=in_one_sentence(reasons) or None)
 
+    def accepts_all_of(self, before: EngineResult) -> bool:
+        """True if every camera that the result `before` accepts is accepted here."""
+        both = zip(before.cameras, self.cameras, strict=True)
+        return all(now.accepted or not then.accepted for then, now in both)
+
     @property
     def accepted(self) -> bool:
         """True if the gate accepts all that was found."""

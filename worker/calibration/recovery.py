@@ -22,7 +22,7 @@ from worker.calibration.detection.view_condition import (
     look_at,
 )
 from worker.calibration.diagnostics.registration import Response
-from worker.calibration.gate.pairs import stitch_error_px
+from worker.calibration.gate.pairs import stitch_error_of
 from worker.calibration.gate.quality import CameraResult, Moved, Refusal
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.rotation import rotation_angles_deg
@@ -60,7 +60,7 @@ LEAST_LIGHT_IN_THE_DARK = 5.0
 """Brightness (0..255) above which a dark field would show its lines, if it is clearly brighter than its noise: where
 none are seen, the camera may have been knocked and the field lie elsewhere in its frame."""
 ON_ITS_MOUNT_M = 2.5
-"""How far from its stored place a camera is searched for first."""
+"""Radius around its stored place in which a camera is searched for first."""
 LEAST_PROPOSED = 0.34
 """Poses that agree less with the lines before they are refined are not refined, unless a search was asked for. Those of
 real frames that were found agree by 0.44 and more, those of upside-down frames and other sports by 0.17 to 0.36."""
@@ -105,9 +105,8 @@ def recover_knocked(solution: Solution, observer: FrameObserver, progress: Progr
     while found:
         there = _restart_from(problem, found)
         again = solve_in_all_colours(there, replace(observer, cameras=there.cameras), progress.muted())
-        both = zip(judged.cameras, again.judged.cameras, strict=True)
         confirmed = {n: one for n, one in found.items() if _is_there(again.judged.cameras[n])}
-        harmed = any(one.accepted and not two.accepted for one, two in both)
+        harmed = not again.judged.accepts_all_of(judged)
         if confirmed.keys() == found.keys() and not harmed:
             return _merge(solution, again, found)
         found = {} if harmed and confirmed.keys() == found.keys() else confirmed
@@ -257,9 +256,8 @@ def _merge(before: Solution, again: Solution, found: Mapping[int, FoundAgain]) -
     back = {n: _beside_stored(problem, n, *both) for n, both in enumerate(results) if n in found}
     base = before if all(result.refusal is not None for result in back.values()) else again
     merged = [back.get(n, result) for n, result in enumerate(base.judged.cameras)]
-    accepted = {result.camera.id for result in merged if result.accepted}
-    pairs = [pair for pair, _ in again.judged.pairs if not accepted or accepted.issuperset(pair.cameras)]
-    judged = replace(base.judged.with_results(merged), stitch_error_px=stitch_error_px(pairs), pairs=again.judged.pairs)
+    stitch = stitch_error_of([pair for pair, _ in again.judged.pairs], merged)
+    judged = replace(base.judged.with_results(merged), stitch_error_px=stitch, pairs=again.judged.pairs)
     return Solution(replace(again.problem, cameras=problem.cameras), base.poses, judged, "anywhere")
 
 

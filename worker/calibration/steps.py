@@ -32,15 +32,15 @@ from worker.calibration.search.objective import Objective
 from worker.calibration.search.search import COARSE_TO_FINE, Found, Strategy, search
 
 CAPTURE_RAD = 0.1
-"""How far a line may be from where the stored pose expects it: 4 degrees of rotation and 0.3 m at 15 m."""
+"""Largest angle between a line and its place by the stored pose: 4 degrees of rotation and 0.3 m at 15 m."""
 LEAST_CAUGHT = 0.6
 """Share of the expected lines that has to be caught in the frame for lines alone to suffice."""
 MOST_CAUGHT, CLEARLY_MORE, MOST_AGAIN = 0.9, 0.02, 3
 """Agreement with the lines below which a refinement is begun again from where it ended, by how much it has to grow with
 that, and how often it may."""
 HARDLY_MOVED_PX = 12.0
-"""How far the visible lines may have moved on average, in pixels of a 4K frame, of a camera that stands almost where it
-is stored: within what the refinement catches."""
+"""Largest mean motion of the visible lines, in pixels of a 4K frame, of a camera that stands almost where it is stored:
+within what the refinement catches."""
 DOUBTFUL = 0.75
 """Agreement below which an accepted camera that moved may have been knocked, and caught by wrong lines."""
 SEARCHED_POWER = 3

@@ -19,7 +19,7 @@ from worker.calibration.diagnostics.registration import (
     register_pair,
     shares_plenty,
 )
-from worker.calibration.gate.quality import GATE, Reason, Refusal
+from worker.calibration.gate.quality import GATE, CameraResult, Reason, Refusal
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.field import Field
 
@@ -206,6 +206,12 @@ def refusal_by_pairs(camera: str, against: Sequence[Contradiction]) -> Refusal |
         return None
     reason: Reason = "not-together" if contradicting[0].error_px is None else "disagree"
     return Refusal(reason, "; ".join(pair.words() for pair in contradicting))
+
+
+def stitch_error_of(pairs: Sequence[Pair], results: Sequence[CameraResult]) -> float | None:
+    """Return the stitch error (px) of the pairs of accepted cameras; of all pairs if no camera is accepted."""
+    accepted = {result.camera.id for result in results if result.accepted}
+    return stitch_error_px([pair for pair in pairs if not accepted or accepted.issuperset(pair.cameras)])
 
 
 def stitch_error_px(pairs: Sequence[Pair]) -> float | None:
