@@ -111,13 +111,16 @@ def print_calibration(result: Result) -> None:
 def _print_camera(camera: CameraResult) -> None:
     moved, sigma = camera.moved, camera.sigma
     within = f"{sigma.rotation_deg:.3f}°, {100 * sigma.position_m:.1f} cm" if sigma else "unknown"
+    if sigma and sigma.ground_m is not None:
+        within += f", {100 * sigma.ground_m:.1f} cm on the field"
     seen = "unknown" if camera.found is None else f"{camera.found:.0%}"
+    sure = "" if camera.confidence is None else f"; confidence {camera.confidence:.3f}"
     print(
         f"{camera.id}: {'accepted' if camera.accepted else 'rejected'}\n"
         f"  rotation  {' '.join(f'{number:9.5f}' for number in camera.pose.rotation)} rad, world to camera\n"
         f"  position  {' '.join(f'{number:9.3f}' for number in camera.pose.position)} m from the pitch centre\n"
         f"  moved     {moved.rotation_deg:.2f}°, {100 * moved.position_m:.1f} cm, {_pixels(moved.pixels)}\n"
-        f"  sigma     {within}; lines fit to {_pixels(camera.residual_px)}; {seen} of the markings seen"
+        f"  sigma     {within}; lines fit to {_pixels(camera.residual_px)}; {seen} of the markings seen{sure}"
     )
 
 

@@ -69,6 +69,15 @@ def degrees(value: float | None) -> str:
     return NONE if value is None else f"{value:.3f}°"
 
 
+def probability(value: float | None) -> str:
+    """Return a probability in percent with a decimal place, of which benchmarks can judge no more: > 99.9 %."""
+    if value is None:
+        return NONE
+    if value > 0.999:
+        return "> 99.9 %"
+    return "< 0.1 %" if value < 0.001 else f"{100 * value:.1f} %"
+
+
 def percent(share: float | None) -> str:
     """Return a share of 0..1 in per cent."""
     return NONE if share is None else f"{100 * share:.0f} %"

@@ -76,6 +76,7 @@ templates.filters |= {
     "on_the_pitch": formatting.on_the_pitch,
     "degrees": formatting.degrees,
     "percent": formatting.percent,
+    "probability": formatting.probability,
     "longer": formatting.length_change,
     "capitalised": formatting.capitalised,
     "ago": formatting.ago,

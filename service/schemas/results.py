@@ -25,6 +25,12 @@ class Sigma(Schema):
 
     rotation_deg: float
     position_m: float
+    ground_m: float | None = Field(
+        None,
+        description="Of the place on the field that pose and lens give a pixel, at the worst marking in view: what the "
+        "gate limits. A long lens may leave its position and focal length open, and know the field well. Null where it "
+        "is not computed.",
+    )
 
 
 Cause = Literal["dark", "fogged", "blinded", "snow", "out-of-focus", "blocked", "other-camera", "no-markings-in-view"]
@@ -171,6 +177,11 @@ class CameraResult(Schema):
         None, description="Share 0..1 of the visible markings' length that is seen where the pose puts it."
     )
     by_chance: float | None = Field(None, description="Share 0..1 of that length that would be seen by chance.")
+    confidence: float | None = Field(
+        None,
+        description="Probability 0..1 that the pose is the right explanation of the frame, rather than one that other "
+        "lines fit by chance; how precise it is, `sigma` says. Null if the frame cannot be used.",
+    )
     residual_px: float | None
     light: Light | None = Field(
         None,

@@ -18,6 +18,7 @@ import numpy as np
 
 from worker.calibration.detection.paint import sort_colours
 from worker.calibration.diagnostics.overlap import Overlap, overlap_of
+from worker.calibration.gate.confidence import logit
 from worker.calibration.gate.quality import MUCH_UNEXPECTED, Moved
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.derivatives import POSE_NUMBERS
@@ -32,8 +33,6 @@ from worker.calibration.steps import network_responses, search_poses
 COMPARED_WIDTH_PX = 1280
 """Width of the frames in which colours are compared. Lines are wide enough to show their paint, and which is the
 field's is seen in overviews."""
-LEAST_SHARE = 0.01
-"""The share of lines that something else always hides, or fits: no camera alone is surer than that."""
 SURE_NATS = float(np.log(1000))
 """By how much the odds of a colour have to be better than those of any other."""
 
@@ -67,10 +66,9 @@ def log_odds(problem: Problem, found: Sequence[Camera], shares: Sequence[float])
     total = 0.0
     for stored, camera, share in zip(problem.cameras, found, shares, strict=True):
         pieces = len(VisibleLines.from_camera(lines, camera)) / CLUSTER_POINTS
-        fitting = float(np.clip(share, LEAST_SHARE, 1 - LEAST_SHARE))
         moved = Moved.between(problem.pitch, stored, camera)
         scale = max(np.radians(moved.rotation_deg) / MOVED_RAD, moved.position_m / MOVED_M, 1.0)
-        total += pieces * np.log(fitting / (1 - fitting)) - POSE_NUMBERS * np.log(scale)
+        total += pieces * logit(share) - POSE_NUMBERS * np.log(scale)
     return total
 
 

@@ -160,7 +160,7 @@ def camera_to_schema(found: quality.CameraResult) -> CameraResult:
         rejected_because=found.rejected_because,
         refusal=None if found.refusal is None else refusal_uri(found.refusal.reason),
         pose=pose_to_schema(found.camera.pose),
-        sigma=sigma_to_schema(found.sigma),
+        sigma=sigma_to_schema(found.sigma, found.ground_sigma),
         repeatability=sigma_to_schema(found.repeatability),
         moved=_moved(found.moved),
         iou=finite_or_none(found.overlap.iou),
@@ -168,6 +168,7 @@ def camera_to_schema(found: quality.CameraResult) -> CameraResult:
         unexpected=finite_or_none(found.overlap.unexpected),
         found=finite_or_none(found.evidence.share),
         by_chance=finite_or_none(found.evidence.by_chance),
+        confidence=finite_or_none(found.confidence),
         view=_view(found.view),
         residual_px=finite_or_none(found.residual_px),
         markings=[_marking(one) for one in found.markings],
@@ -188,7 +189,7 @@ def _is_proposed(found: quality.CameraResult) -> bool:
 def _proposal(found: quality.CameraResult) -> Proposal:
     return Proposal(
         pose=pose_to_schema(found.camera.pose),
-        sigma=sigma_to_schema(found.sigma),
+        sigma=sigma_to_schema(found.sigma, found.ground_sigma),
         moved=_moved(found.moved),
         found=finite_or_none(found.evidence.share),
     )
@@ -269,8 +270,12 @@ def _view(found: ViewCondition) -> View:
     )
 
 
-def sigma_to_schema(sigma: uncertainty.Sigma | None) -> Sigma | None:
-    """Return a standard deviation of the engine for the wire, or None if the pose is not determined."""
+def sigma_to_schema(sigma: uncertainty.Sigma | None, ground: uncertainty.GroundSigma | None = None) -> Sigma | None:
+    """Return a standard deviation of the engine for the wire, or None if the pose is not determined.
+
+    `ground`: that of the markings in view, where it is known.
+    """
     if sigma is None or not isfinite(sigma.rotation_deg) or not isfinite(sigma.position_m):
         return None
-    return Sigma(rotation_deg=sigma.rotation_deg, position_m=sigma.position_m)
+    ground_m = None if ground is None else finite_or_none(ground.largest_m)
+    return Sigma(rotation_deg=sigma.rotation_deg, position_m=sigma.position_m, ground_m=ground_m)

@@ -12,6 +12,7 @@ from worker.calibration.detection.evidence import LEAST_ROOM, Evidence
 from worker.calibration.detection.view_condition import ViewCondition
 from worker.calibration.diagnostics.markings import MarkingReport
 from worker.calibration.diagnostics.overlap import Overlap
+from worker.calibration.gate.confidence import confidence_of
 from worker.calibration.geometry.camera import Camera, inside
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.plausible_pose import films_a_field
@@ -147,6 +148,11 @@ class CameraResult(RefinedPose):
     def accepted(self) -> bool:
         """True if the gate lets the pose replace the stored one."""
         return self.refusal is None
+
+    @property
+    def confidence(self) -> float | None:
+        """Probability 0..1 that the pose explains the frame; None where the frame cannot be used."""
+        return confidence_of(self.evidence.agreement, self.overlap.iou) if self.view.usable else None
 
     @property
     def rejected_because(self) -> str | None:

@@ -97,6 +97,11 @@ class GroundSigma:
     metres: Array
     pixels: Array
 
+    @property
+    def largest_m(self) -> float:
+        """Metres of the worst marking in view, but for the twentieth of the points that are worst."""
+        return float(np.quantile(self.metres, 0.95))
+
     def worst(self, metres: float, pixels: float) -> tuple[float, float, bool]:
         """Return metres and pixels of the worst marking, and True if they are beyond both of these limits.
 
