@@ -104,6 +104,10 @@ def _chooses(row: dict) -> bool:
     return (key["view"] if "view" in key else zlib.crc32(key["real"].encode())) % 2 == 0
 
 
+def _log_odds(row: dict) -> tuple[float, float]:
+    return logit(row["agreement"]), logit(row["agreement"] / (1 + row["unexplained"]))
+
+
 def _weights(rows: Sequence[dict]) -> np.ndarray:
     """Return bias and weights (3,) of both log odds by logistic regression on the half that chooses.
 
@@ -111,7 +115,7 @@ def _weights(rows: Sequence[dict]) -> np.ndarray:
     answers are apart.
     """
     chosen = [row for row in rows if _chooses(row)]
-    design = np.array([[1.0, logit(row["agreement"]), logit(row["iou"])] for row in chosen]).reshape(-1, 3)
+    design = np.array([[1.0, *_log_odds(row)] for row in chosen]).reshape(-1, 3)
     right = np.array([_is_right(row) for row in chosen])
     weights, prior = np.zeros(3), np.diag([0.0, 0.01, 0.01])
     for _ in range(50):
@@ -131,10 +135,10 @@ def _reliability(rows: Sequence[dict]) -> Iterator[str]:
     )
     for least, most in pairwise(BINS):
         cells = []
-        inside_bin = [row for row in judged if least <= confidence_of(row["agreement"], row["iou"]) < most]
+        inside_bin = [row for row in judged if least <= confidence_of(row["agreement"], row["unexplained"]) < most]
         for half in (True, False):
             part = [row for row in inside_bin if _chooses(row) == half]
-            mean = np.mean([confidence_of(row["agreement"], row["iou"]) for row in part]) if part else None
+            mean = np.mean([confidence_of(row["agreement"], row["unexplained"]) for row in part]) if part else None
             share = np.mean([_is_right(row) for row in part]) if part else None
             cells += [str(len(part)), *("" if value is None else f"{value:.3f}" for value in (mean, share))]
         accepted = [row for row in inside_bin if row["accepted"]]
@@ -214,6 +218,8 @@ def _inputs(pitch: Field, result: CameraResult) -> dict:
         "iou": result.overlap.iou,
         "expected": result.overlap.found,
         "unexpected": result.overlap.unexpected,
+        # JSON has no infinity.
+        "unexplained": min(result.overlap.unexplained, 1e6),
         "zoom": None if result.zoom is None else [result.zoom.value, result.zoom.sigma, result.zoom_shift_m],
         "relative_size": result.camera.intrinsics.relative_size,
     }

@@ -17,7 +17,7 @@ from worker.calibration.detection.ridge_response import ridge_response
 from worker.calibration.diagnostics.markings import report_markings
 from worker.calibration.diagnostics.overlap import overlap_of
 from worker.calibration.diagnostics.registration import Response
-from worker.calibration.gate.quality import GATE, MUCH_UNEXPECTED, CameraResult, Moved, alone_rejection
+from worker.calibration.gate.quality import MUCH_UNEXPECTED, CameraResult, Moved, alone_rejection
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.parameters import Parameter, free_focal_lengths, free_ridge
@@ -96,7 +96,7 @@ def single_camera_problem(problem: Problem, number: int) -> Problem:
 def best_attempt(problem: Problem, found: Camera, progress: ProgressReporter) -> Attempt:
     """Refine a single camera from where the joint search `found` it, and while it fails the gate from other poses."""
     best = _attempt(problem, found, progress)
-    for start in _other_starts(problem, progress, lost=best.agreement < GATE.least_agreement):
+    for start in _other_starts(problem, progress, lost=not best.result.is_explained):
         if best.result.accepted:
             break
         best = max(best, _attempt(problem, start, progress), key=lambda attempt: attempt.agreement)

@@ -27,6 +27,13 @@ class Overlap:
     found: float
     unexpected: float
 
+    @property
+    def unexplained(self) -> float:
+        """Paint on the field beside every expected line, as line, by the length of those; inf where none is found."""
+        if self.iou > 0:
+            return self.found / self.iou - 1
+        return float("inf") if self.unexpected > 0 else 0.0
+
 
 def overlap_of(pitch: Field, camera: Camera, response: NDArray[np.float32]) -> Overlap:
     """Measure the overlap of the markings expected by the pose with those in the segmentation (H, W).

@@ -1,25 +1,24 @@
 """Confidence: how probable it is that a pose explains its frame, rather than that other lines fit by chance.
 
-Two witnesses see the frame. The agreement asks along the expected lines, how much more of them is found than chance
-would find; the intersection over union asks the other way, too: how much paint on the field no line explains. The log
-odds of the pose are a weighted sum of the log odds of both. Pieces of line are no further witnesses: what misleads one
-of them (a floor of several sports, a shadow, a fence) misleads its neighbours, and with ten times the lines a wrong
-pose is no less likely to find 0.6 of them.
+Two questions are asked of the frame. How many of the expected lines are found, beyond those that chance would find
+(the agreement)? And how many, if all paint on the field that no line explains counts as line that was expected and not
+found? The log odds of the pose are a weighted sum of the log odds of both answers. Pieces of line are no further
+witnesses: what misleads one of them (a floor of several sports, a shadow, a fence) misleads its neighbours.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-BIAS, OF_AGREEMENT, OF_IOU = 0.27, 1.45, 1.81
+BIAS, OF_AGREEMENT, OF_EXPLAINED = -0.9, 2.3, 3.3
 """Logistic regression (Platt, 1999) of right answers on both log odds: `python -m benchmarks.confidence`."""
 LEAST_SHARE = 0.01
-"""Share of lines that something else always hides, or fits: no witness alone is surer than that."""
+"""Share of lines that something else always hides, or fits: no answer is surer than that."""
 
 
-def confidence_of(agreement: float, iou: float) -> float:
-    """Return the probability 0..1 that a pose is right, by `Evidence.agreement` and `Overlap.iou` (0..1)."""
-    odds = BIAS + OF_AGREEMENT * logit(agreement) + OF_IOU * logit(iou)
+def confidence_of(agreement: float, unexplained: float) -> float:
+    """Return the probability 0..1 that a pose is right, by `Evidence.agreement` and `Overlap.unexplained`."""
+    odds = BIAS + OF_AGREEMENT * logit(agreement) + OF_EXPLAINED * logit(agreement / (1 + unexplained))
     return float(1 / (1 + np.exp(-odds)))
 
 

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from worker.calibration.detection.evidence import LEAST_ROOM, Evidence
+from worker.calibration.detection.evidence import Evidence
 from worker.calibration.detection.view_condition import ViewCondition
 from worker.calibration.diagnostics.markings import MarkingReport
 from worker.calibration.diagnostics.overlap import Overlap
@@ -29,8 +29,8 @@ MUCH_UNEXPECTED = 0.4
 class Gate:
     """Limits a result has to keep to replace the stored poses. Pixels are those of a 4K frame, unless said.
 
-    `least_agreement`: right poses find 0.8 and more of the lines beyond chance on fields of every kind, poses that have
-    settled on other lines up to 0.5. `residual_floor_px`: of the frame itself; lines of a small frame are no sharper.
+    `least_confidence`: below it a wrong pose accepted, ten times as bad as a right one refused, costs more than it
+    saves. `residual_floor_px`: of the frame itself; lines of a small frame are no sharper.
     `largest_ground_sigma_m`: of where markings are put on the ground, which is what poses are used for; pose and lens
     of a long view may be off by metres along it, and make up for each other. Where grass is so far that it moves by
     less than `largest_ground_sigma_px` of the frame itself, the frame cannot tell its place any better.
@@ -38,7 +38,7 @@ class Gate:
     camera may be whose focal length the lines contradict.
     """
 
-    least_agreement: float = 0.6
+    least_confidence: float = 10 / 11
     agreement_loss: float = 0.1
     largest_residual_px: float = 2.4
     residual_floor_px: float = 1.2
@@ -54,10 +54,6 @@ class Gate:
     def most_residual_px(self, camera: Camera) -> float:
         """Return the largest rms offset of lines, in pixels of the camera's own frame, for a pose that fits them."""
         return max(self.largest_residual_px * camera.intrinsics.relative_size, self.residual_floor_px)
-
-    def least_share(self, seen: Evidence) -> float:
-        """Return the least share of the markings that has to be seen, 0..1, beside what chance finds."""
-        return seen.by_chance + self.least_agreement * max(1 - seen.by_chance, LEAST_ROOM)
 
 
 GATE = Gate()
@@ -152,7 +148,12 @@ class CameraResult(RefinedPose):
     @property
     def confidence(self) -> float | None:
         """Probability 0..1 that the pose explains the frame; None where the frame cannot be used."""
-        return confidence_of(self.evidence.agreement, self.overlap.iou) if self.view.usable else None
+        return confidence_of(self.evidence.agreement, self.overlap.unexplained) if self.view.usable else None
+
+    @property
+    def is_explained(self) -> bool:
+        """True if the pose surely enough explains the frame."""
+        return self.confidence is not None and self.confidence >= GATE.least_confidence
 
     @property
     def rejected_because(self) -> str | None:
@@ -171,7 +172,7 @@ def in_one_sentence(reasons: Sequence[str]) -> str:
 
 def credible_deviations(deviations: Sequence[Deviation], results: Sequence[CameraResult]) -> list[Deviation]:
     """Return the deviations that were read off cameras which see the field where they expect it."""
-    lost = {result.camera.id for result in results if result.evidence.agreement < GATE.least_agreement}
+    lost = {result.camera.id for result in results if not result.is_explained}
     of_field = not lost or any(result.accepted for result in results)
     return [d for d in deviations if (of_field if d.camera is None else d.camera not in lost)]
 
@@ -193,15 +194,16 @@ def alone_rejection(result: CameraResult) -> Refusal | None:
     if not result.view.usable:
         return Refusal(_reason_of(result.view), result.view.words)
     moved, seen = result.moved, result.evidence
-    if seen.agreement < GATE.least_agreement:
+    if not result.is_explained:
         return Refusal(
             "lines",
             in_one_sentence(
                 [
                     f"the markings in the frame do not fit this pitch: {seen.share:.0%} of their length is where it "
-                    f"ought to be, at least {GATE.least_share(seen):.0%} are needed ({seen.by_chance:.0%} is seen "
-                    "anywhere); is it the right camera and the right sport, is the view free and lit, is the stored "
-                    "pose within a few degrees?",
+                    f"ought to be ({seen.by_chance:.0%} is seen anywhere), and beside them is paint for "
+                    f"{min(result.overlap.unexplained, 9.99):.0%} of it; the pose is right with a probability of "
+                    f"{result.confidence:.0%}, at least {GATE.least_confidence:.0%} is needed; is it the right camera "
+                    "and the right sport, is the view free and lit, is the stored pose within a few degrees?",
                     *_other_lines(result),
                 ]
             ),

@@ -12,21 +12,26 @@ from worker.calibration.diagnostics.overlap import Overlap
 from worker.calibration.gate.confidence import confidence_of
 from worker.jobs.to_schemas import camera_to_schema
 
-SHARE = st.floats(0, 1)
+SHARE, PAINT = st.floats(0, 1), st.floats(0, 100)
 
 
-@given(SHARE, SHARE, SHARE, SHARE)
-def test_confidence_is_a_probability_that_grows_with_each_witness(agreement, iou, more_agreement, more_iou):
-    less = confidence_of(min(agreement, more_agreement), min(iou, more_iou))
-    more = confidence_of(max(agreement, more_agreement), max(iou, more_iou))
+@given(SHARE, SHARE, PAINT, PAINT)
+def test_confidence_is_a_probability_that_grows_with_lines_and_falls_with_paint_beside_them(a, b, paint, more_paint):
+    less = confidence_of(min(a, b), max(paint, more_paint))
+    more = confidence_of(max(a, b), min(paint, more_paint))
     assert 0 < less <= more < 1
 
 
-def test_no_witness_alone_makes_a_pose_sure():
+def test_lines_that_are_found_amid_much_other_paint_make_no_pose_sure():
     # In a hall of several sports lines are found wherever a pose puts them.
-    assert confidence_of(0.87, 0.15) < 0.9
-    assert confidence_of(0.15, 0.87) < 0.9
-    assert confidence_of(0.87, 0.87) > 0.99
+    assert confidence_of(0.87, 5.0) < 0.1
+    assert confidence_of(0.87, 0.1) > 0.99
+
+
+def test_a_network_that_sees_nothing_speaks_against_no_pose():
+    assert Overlap(iou=0.0, found=0.0, unexpected=0.0).unexplained == 0
+    assert Overlap(iou=0.0, found=0.0, unexpected=1.0).unexplained == float("inf")
+    assert confidence_of(0.95, float("inf")) < 0.01
 
 
 @pytest.mark.parametrize(("share", "iou", "least", "most"), [(0.95, 0.9, 0.99, 1), (0.4, 0.2, 0, 0.1)])

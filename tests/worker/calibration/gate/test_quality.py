@@ -25,8 +25,9 @@ def test_a_good_result_passes_the_gate():
     ("change", "cause"),
     [
         (
-            {"evidence": seen(0.4)},
-            "40% of their length is where it ought to be, at least 68% are needed (20% is seen anywhere)",
+            {"evidence": seen(0.4), "overlap": Overlap(0.3, 0.4, 0.4)},
+            "40% of their length is where it ought to be (20% is seen anywhere), and beside them is paint for 33% of "
+            "it; the pose is right with a probability of 0%, at least 91% is needed",
         ),
         ({"view": FOGGED, "evidence": seen(0.1)}, "Fogged (far half)"),
         ({"residual_px": None}, "fewer than 30 points"),
