@@ -13,6 +13,7 @@ from service.store import tables
 from service.store.database import connect, migrate, writing
 from testbed import warm
 from testbed.homes import Embedded, environment, files
+from testbed.parameters import try_first
 from testbed.running import Service, wait_for
 from tests.e2e.commands import esc_here, esc_process
 
@@ -171,7 +172,9 @@ def home_with_files(folder, count=1500):
         (folder / "blobs" / "frames" / f"{number}").write_bytes(b"a frame")
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGINT, signal.SIGKILL], ids=lambda n: n.name)
+@pytest.mark.parametrize(
+    "number", try_first([signal.SIGKILL, signal.SIGTERM, signal.SIGHUP, signal.SIGINT], 2), ids=lambda n: n.name
+)
 def test_a_copy_that_is_ended_leaves_nothing_or_what_the_next_one_goes_on_with(tmp_path, number):
     here, there = tmp_path / "here", tmp_path / "there"
     home_with_files(here)

@@ -7,7 +7,7 @@ import time
 from service.serving import GRACE_S
 from testbed.books import settle
 from testbed.disks import filled
-from testbed.homes import in_both_homes, on_servers
+from testbed.homes import in_both_homes, in_one_home_first, on_servers
 from testbed.killing import (
     chance,
     kill_api,
@@ -70,7 +70,7 @@ def test_a_worker_on_another_machine_takes_over(start, worker_beside):
     assert [revision["cause"] for revision in history] == ["calibrated", "put"]
 
 
-@in_both_homes
+@in_one_home_first
 def test_a_worker_killed_at_any_moment_of_its_job_costs_it_an_attempt_and_nothing_else(start):
     service = start("up", ESC_TIDY_EVERY_S="0.5").ready()
     seconds = seconds_of_a_job(service, service.venue("alone", "accept 0.3"))
@@ -80,7 +80,7 @@ def test_a_worker_killed_at_any_moment_of_its_job_costs_it_an_attempt_and_nothin
     settle(service)
 
 
-@in_both_homes
+@in_one_home_first
 def test_a_submission_killed_at_any_moment_is_one_job_or_none(start):
     service = start("up", ESC_TIDY_EVERY_S="0.5").ready()
     seconds = seconds_of_a_submission(service, service.venue("alone"))

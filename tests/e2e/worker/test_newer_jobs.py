@@ -6,7 +6,7 @@ import pytest
 import sqlalchemy as sa
 
 from service.store import tables
-from testbed.homes import in_both_homes
+from testbed.homes import in_one_home_first
 from testbed.running import wait_for
 from tests.e2e.observe.figures import families
 
@@ -32,7 +32,7 @@ def unreadable(service):
     return sum(sample.value for sample in families(service)["esc_worker_unreadable_jobs"].samples)
 
 
-@in_both_homes
+@in_one_home_first
 def test_a_job_with_options_of_a_newer_version_waits_for_a_worker_of_that_version(start, worker_beside):
     service = start("serve")
     newer, plain = (service.submitted(service.venue(name)) for name in ("newer", "plain"))

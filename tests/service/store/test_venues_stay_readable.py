@@ -17,7 +17,7 @@ from hypothesis.stateful import (
 )
 
 from service.schemas.job import JobError
-from testbed.homes import in_both_homes
+from testbed.homes import in_one_home_first
 from testbed.running import venue
 from testbed.stock import result
 from tests.service.local_service import LocalService
@@ -144,7 +144,7 @@ class Venues(RuleBasedStateMachine):
         assert self.ask("DELETE", f"/venues/{self.id}").status_code == 204
 
 
-@in_both_homes
+@in_one_home_first
 def test_a_venue_stays_readable(stock):
     stays = settings(
         max_examples=12,

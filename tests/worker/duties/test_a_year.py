@@ -91,6 +91,7 @@ def smeared(frame: np.ndarray) -> np.ndarray:
     return dirty.astype(np.uint8)
 
 
+@pytest.mark.long
 def test_nights_add_up_and_go_on_when_the_refined_lens_is_stored(year, stock):
     for night in range(3):
         year.pass_(1)

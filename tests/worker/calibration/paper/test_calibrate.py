@@ -47,6 +47,7 @@ def test_its_predecessor_takes_the_ground_for_a_plane():
     assert calibrated("scpr")[0].pitch.ridge is None
 
 
+@pytest.mark.long
 def test_a_black_frame_leaves_its_camera_at_the_stored_pose():
     left, right = frames()["left"], (np.zeros_like(frames()["right"][0]),)
     found = calibrate_by_paper(
