@@ -73,6 +73,7 @@ def test_each_candidate_has_a_picture(answered):
     assert picture.shape == (SIZE[1], SIZE[0], 3)
 
 
+@pytest.mark.long
 def test_a_frame_that_shows_no_field_is_refused_with_why_and_writes_no_venue(tmp_path):
     lens = ("image_size", "intrinsics")
     write(tmp_path, site(left=lens, right=lens))

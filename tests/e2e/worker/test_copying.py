@@ -173,7 +173,7 @@ def home_with_files(folder, count=1500):
 
 
 @pytest.mark.parametrize(
-    "number", try_first([signal.SIGKILL, signal.SIGTERM, signal.SIGHUP, signal.SIGINT], 2), ids=lambda n: n.name
+    "number", try_first([signal.SIGKILL, signal.SIGTERM, signal.SIGHUP, signal.SIGINT]), ids=lambda n: n.name
 )
 def test_a_copy_that_is_ended_leaves_nothing_or_what_the_next_one_goes_on_with(tmp_path, number):
     here, there = tmp_path / "here", tmp_path / "there"
@@ -240,6 +240,7 @@ def test_a_database_that_is_not_empty_or_of_another_schema_is_refused_and_left_a
     assert esc("home", "copy", "mysql://host/name", there).returncode == 2
 
 
+@pytest.mark.long
 def test_what_fails_in_the_middle_leaves_the_target_empty(servers, esc, tmp_path):
     folder = tmp_path / "here"
     here, there = Embedded().database_url(folder), servers.settings(tmp_path / "there")

@@ -4,10 +4,12 @@ import os
 import signal
 import time
 
+import pytest
+
 from service.serving import GRACE_S
 from testbed.books import settle
 from testbed.disks import filled
-from testbed.homes import in_both_homes, in_one_home_first, on_servers
+from testbed.homes import in_one_home_first, on_servers
 from testbed.killing import (
     chance,
     kill_api,
@@ -47,7 +49,7 @@ def test_a_killed_worker_comes_back_and_its_job_ends_once(start):
     assert service.worker() != worker
 
 
-@in_both_homes
+@in_one_home_first
 def test_a_worker_on_another_machine_takes_over(start, worker_beside):
     silence_s = 3
     service = start("serve", ESC_TAKEOVER_AFTER_S=str(silence_s))
@@ -143,7 +145,7 @@ def test_a_program_and_a_network_that_are_not_there_are_told(start):
     wait_for(lambda: service.http.get("/readyz").json()["parts"]["model"].startswith("missing at"))
 
 
-@in_both_homes
+@in_one_home_first
 def test_while_the_database_is_away_the_service_says_so_and_a_job_goes_on(start, home):
     # Without a key to look up: otherwise it could not tell whether the caller may know.
     service = start("up", ESC_AUTH="off").ready()
@@ -169,6 +171,7 @@ def test_while_the_database_is_away_the_service_says_so_and_a_job_goes_on(start,
     service.ready()
 
 
+@pytest.mark.long
 @on_servers
 def test_a_long_absence_of_the_database_is_no_workers_death(start, home, worker_beside):
     silence_s = 3

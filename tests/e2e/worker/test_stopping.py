@@ -7,7 +7,7 @@ import pytest
 
 from service.store.database import connect
 from service.store.workers import WorkerRepository
-from testbed.homes import in_both_homes, in_one_home_first
+from testbed.homes import in_one_home_first
 from testbed.running import alive, wait_for
 from tests.e2e.commands import esc_process
 from tests.e2e.observe.figures import figures
@@ -17,7 +17,7 @@ from tests.e2e.worker.test_crashes import poses
 AT_ONCE_S = 15
 
 
-@in_both_homes
+@in_one_home_first
 def test_a_worker_that_is_stopped_lets_its_job_end_and_takes_no_other(start, worker_beside):
     service = start("serve")
     worker = worker_beside(service, "w")

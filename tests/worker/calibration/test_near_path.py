@@ -166,6 +166,7 @@ def test_nobody_is_told_of_looking_nearby_in_vain():
     assert list(dict.fromkeys(step.stage for step in steps)) == ["segmentation", "evolution", "refinement"]
 
 
+@pytest.mark.long
 def test_the_same_frames_sent_again_change_nothing():
     frames = {one.id: [frame] for one, frame in zip(pair(), pair_frames(), strict=True)}
     first = again = nearby()

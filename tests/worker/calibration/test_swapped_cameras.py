@@ -29,6 +29,7 @@ def test_exchanged_cameras_are_named_each_after_the_other_and_are_no_knock():
         np.testing.assert_array_equal(one.camera.pose.position, before.pose.position)
 
 
+@pytest.mark.long
 def test_a_frame_that_was_sent_for_two_cameras_is_refused_for_the_one_it_is_not_of():
     found = run(pictures={"left": frames()["right"], "right": frames()["right"]})
     assert reasons(found) == [OTHER_CAMERA, None]

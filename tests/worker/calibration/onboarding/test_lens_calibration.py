@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
+from testbed.parameters import try_first
 from worker.calibration.geometry.lens import LENSES
 from worker.calibration.geometry.rotation import rotation_matrices
 from worker.calibration.onboarding.boards import Board, BoardDetection, Charuco, find_board, other_size
@@ -140,7 +141,7 @@ def test_blur_is_measured():
     assert soft > 2 * sharp
 
 
-@pytest.mark.parametrize(("model", "truth"), [("opencv", PINHOLE), ("fisheye", FISHEYE)])
+@pytest.mark.parametrize(("model", "truth"), try_first([("opencv", PINHOLE), ("fisheye", FISHEYE)]))
 def test_the_lens_is_found_within_what_is_said_of_it(model, truth):
     found = calibrated(model)
     assert found.lens.model == model
@@ -204,6 +205,7 @@ def test_stretched_pixels_are_noticed():
     assert found.lens.matrix[1, 1] / found.lens.matrix[0, 0] == pytest.approx(0.75, abs=0.005)
 
 
+@pytest.mark.long
 def test_a_photo_that_hurts_is_named_and_left_out():
     given = photos()
     bent = given[3].detection

@@ -5,6 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from testbed.parameters import try_first
 from testbed.synthetic import CROWNED
 from tests.worker.calibration.outdated_pair import frames, outdated, white_on_green
 from worker.calibration.paper.calibrate import PRESETS, calibrate_by_paper
@@ -32,7 +33,7 @@ def calibrated(preset):
     return found, recorder
 
 
-@pytest.mark.parametrize("preset", PRESETS)
+@pytest.mark.parametrize("preset", try_first(PRESETS))
 def test_every_camera_is_left_where_the_search_ends(preset):
     found, recorder = calibrated(preset)
     assert (found.generations, found.path) == (FEW.generations, "wide")
@@ -42,6 +43,7 @@ def test_every_camera_is_left_where_the_search_ends(preset):
         np.testing.assert_array_equal(result.camera.pose.position, best.pose.position)
 
 
+@pytest.mark.long
 def test_its_predecessor_takes_the_ground_for_a_plane():
     assert calibrated("paper")[0].pitch.ridge is not None
     assert calibrated("scpr")[0].pitch.ridge is None

@@ -25,6 +25,7 @@ def test_a_camera_is_caught_that_is_as_far_off_as_the_papers():
     assert rotation_angles_deg(found.pose.rotation, camera.pose.rotation) < 0.5
 
 
+@pytest.mark.long
 def test_all_generations_are_used_even_where_nothing_moves():
     steps = []
     found = search_on_ground(

@@ -112,6 +112,7 @@ def test_other_lenses_are_looked_through_where_the_first_find_nothing():
     assert answers[1].refusal is None
 
 
+@pytest.mark.long
 def test_a_camera_stands_where_it_may():
     _, _, answer = found("football", "SIDELINE", lens_is_known=True, place=Place("far"))
     assert answer.candidates[0].camera.pose.position[1] > 0
