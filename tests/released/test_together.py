@@ -6,14 +6,15 @@ import signal
 import pytest
 
 from testbed.books import settle
-from testbed.homes import in_one_home_first
+from testbed.homes import in_both_homes
 from testbed.running import Service, png, venue, wait_for
 from tests.e2e.commands import esc_process
 
 JOBS = 6
 
 
-@in_one_home_first
+@pytest.mark.long
+@in_both_homes
 def test_workers_of_both_versions_compute_what_apis_of_both_submit_and_an_upgrade_loses_no_job(start, release, worker):
     # Old processes begin before the schema is brought up to date: none can start after that.
     old = start("serve", **release.environment)

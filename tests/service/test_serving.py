@@ -49,6 +49,7 @@ def test_a_worker_that_cannot_be_started_is_tried_again(starts, tmp_path):
         wait_for(starts)
 
 
+@pytest.mark.long
 def test_an_ipv6_address_is_told_as_a_url_has_it(tmp_path):
     command = [sys.executable, "-m", "service.cli", "serve", "--host", "::1", "--port", "0", "--data", str(tmp_path)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as api:

@@ -11,7 +11,7 @@ import pytest
 import sqlalchemy as sa
 
 from service.store import tables
-from testbed.homes import in_one_home_first
+from testbed.homes import in_both_homes
 from testbed.network_cameras import NetworkCamera
 from testbed.running import upload, venue, wait_for
 
@@ -39,7 +39,7 @@ def push(service, name, until, answers):
 
 
 @pytest.mark.long
-@in_one_home_first
+@in_both_homes
 def test_a_schedule_gets_its_turn_however_many_clients_push(start, camera):
     service = start("up", ESC_QUEUE_LIMIT=str(LIMIT), ESC_SOURCES=json.dumps(["127.0.0.1"])).ready()
     document = venue("scheduled", cameras=("left",)) | {"schedule": {"cron": "0 3 * * *"}}

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from testbed.parameters import try_first
 from testbed.synthetic import CROWNED, camera, moved, paint_markings, pair
 from tests.worker.calibration.outdated_pair import WIND, frames, outdated, result, run
 from worker.calibration.geometry.camera import Pose
@@ -50,7 +49,8 @@ def test_a_frame_that_its_own_camera_explains_is_never_called_anothers():
     assert reasons(result()) == [None, None]
 
 
-@pytest.mark.parametrize("spoiled", try_first([np.zeros_like, lambda frame: np.full_like(frame, 128)]))
+@pytest.mark.long
+@pytest.mark.parametrize("spoiled", [np.zeros_like, lambda frame: np.full_like(frame, 128)])
 def test_a_spoiled_frame_is_not_called_anothers(spoiled):
     found = run(pictures={**frames(), "left": (spoiled(frames()["left"][0]),)})
     assert found.cameras[0].refusal.reason != OTHER_CAMERA

@@ -191,6 +191,7 @@ def streamed(clip, port):
             process.kill()
 
 
+@pytest.mark.long
 def test_a_live_stream_is_tracked_and_again_after_it_was_cut(clip, missing, monkeypatch):
     if shutil.which("ffmpeg") is None:
         missing("ffmpeg")

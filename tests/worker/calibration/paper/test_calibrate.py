@@ -5,7 +5,6 @@ from functools import cache
 import numpy as np
 import pytest
 
-from testbed.parameters import try_first
 from testbed.synthetic import CROWNED
 from tests.worker.calibration.outdated_pair import frames, outdated, white_on_green
 from worker.calibration.paper.calibrate import PRESETS, calibrate_by_paper
@@ -33,7 +32,8 @@ def calibrated(preset):
     return found, recorder
 
 
-@pytest.mark.parametrize("preset", try_first(PRESETS))
+@pytest.mark.long
+@pytest.mark.parametrize("preset", PRESETS)
 def test_every_camera_is_left_where_the_search_ends(preset):
     found, recorder = calibrated(preset)
     assert (found.generations, found.path) == (FEW.generations, "wide")
