@@ -28,6 +28,7 @@ $(VENV)/.installed: $(VENV)/.runtime
 # Compiled files are kept even where the machine says not to: each of hundreds of processes would compile them anew.
 PYTEST := PYTHONDONTWRITEBYTECODE= $(BIN)/pytest --numprocesses=auto --dist=worksteal
 
+# Every behaviour, once: five minutes of two cores.
 test: setup
 	$(PYTEST) -m "not long"
 
@@ -36,7 +37,7 @@ test-fast: setup
 	PYTHONDONTWRITEBYTECODE= $(BIN)/pytest --numprocesses=logical --dist=worksteal -m "not (long or slow or servers)" \
 		tests/fields tests/service tests/worker tests/openapi tests/test_architecture.py
 
-# Before a release: a year of a venue, more made-up requests, and where ../shared/real is, the walk of docs/first-calibration.md.
+# What CI runs after `make test`: proofs of accuracy, second parameters, a year of a venue; CONTRIBUTING.md says which.
 test-long: setup
 	$(PYTEST) -m long
 

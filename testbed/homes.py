@@ -25,6 +25,7 @@ import pytest
 from obstore.store import from_url
 
 from service.store.database import connect, migrate
+from testbed.parameters import try_first
 
 STARTING_S = 60
 BUCKET = "esc-tests"
@@ -32,6 +33,8 @@ BUCKET = "esc-tests"
 HASTY = ("fsync=off", "synchronous_commit=off", "full_page_writes=off")
 # On a test: which home, or homes, it runs in. What it builds, it builds in the home that the fixture `home` gives.
 in_both_homes = pytest.mark.parametrize("home", ["embedded", "servers"], indirect=True)
+# For what no database, lock, clock or list decides: on servers it is tried by `make test-long` alone.
+in_one_home_first = pytest.mark.parametrize("home", try_first(["embedded", "servers"]), indirect=True)
 on_servers = pytest.mark.parametrize("home", ["servers"], indirect=True)
 
 

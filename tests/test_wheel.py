@@ -9,6 +9,8 @@ import zipfile
 from importlib.metadata import version
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("fields", "models", "service", "worker")
 # What makes the network, and what is written about it.
@@ -27,6 +29,7 @@ def built(tmp_path, source, **environment):
         return shipped, archive.read(COMMIT).decode().strip() if COMMIT in shipped else None
 
 
+@pytest.mark.long
 def test_a_wheel_says_the_commit_of_the_clone_it_was_built_in(tmp_path):
     source = copied(tmp_path / "source")
     git = ["git", "-C", source, "-c", "user.name=n", "-c", "user.email=e"]
@@ -43,10 +46,12 @@ def test_a_wheel_says_the_commit_of_the_clone_it_was_built_in(tmp_path):
     assert said.stdout == f"{version('esc-calibration')} (commit {head[:12]})\n"
 
 
+@pytest.mark.long
 def test_without_a_clone_the_environment_says_the_commit(tmp_path):
     assert built(tmp_path, copied(tmp_path / "source"), SOURCE_COMMIT="c0ffee")[1] == "c0ffee"
 
 
+@pytest.mark.long
 def test_the_documented_commands_install_the_extras_of_the_wheel(tmp_path):
     """All that they ask for is installed here: with no index at hand, pip finds what it would install."""
     built(tmp_path, copied(tmp_path / "source"))

@@ -9,6 +9,7 @@ from contextlib import ExitStack
 import httpx
 import pytest
 
+from testbed.parameters import try_first
 from testbed.running import DEADLINE_S, Service, keys_in, png, venue
 from tests.e2e.proxies import NAME, STALL_S, Caddy, Nginx
 from tests.e2e.routes.event_stream import Stream
@@ -27,7 +28,7 @@ def keyed(tmp_path_factory):
     running.kill()
 
 
-@pytest.fixture(scope="module", params=[Nginx, Caddy], ids=lambda kind: kind.program)
+@pytest.fixture(scope="module", params=try_first([Nginx, Caddy]), ids=lambda kind: kind.program)
 def proxy(request, keyed, missing, tmp_path_factory):
     if shutil.which(request.param.program) is None:
         missing(request.param.program)

@@ -5,6 +5,7 @@ import shutil
 import pytest
 
 from service.client import Client
+from testbed.parameters import try_first
 from testbed.running import Service, keys_in, png, venue
 from tests.e2e.proxies import NAME, Caddy, Nginx
 from tests.e2e.routes.event_stream import Stream
@@ -21,7 +22,7 @@ def below(tmp_path_factory):
     running.kill()
 
 
-@pytest.fixture(scope="module", params=[Nginx, Caddy], ids=lambda kind: kind.program)
+@pytest.fixture(scope="module", params=try_first([Nginx, Caddy]), ids=lambda kind: kind.program)
 def proxy(request, below, missing, tmp_path_factory):
     if shutil.which(request.param.program) is None:
         missing(request.param.program)

@@ -68,6 +68,7 @@ def test_the_lines_of_a_rendered_court_lie_where_its_camera_projects_them(name: 
     assert np.abs(np.linalg.lstsq(normal[seen], off[seen], rcond=None)[0]).max() < 0.1
 
 
+@pytest.mark.long
 def test_the_picture_shows_the_lines_where_they_are():
     pitch = pitch_of("tennis")
     camera = above(pitch)

@@ -112,6 +112,7 @@ def test_where_nothing_is_people_find_a_page_without_a_word_of_requests(stub, pa
     assert "To the venues</a>" in shown
 
 
+@pytest.mark.long
 def test_the_interface_is_drawn_without_internet_has_a_way_back_and_speaks_of_no_key_where_none_is_asked_for(
     stub, visit
 ):
@@ -127,6 +128,7 @@ def test_the_interface_is_drawn_without_internet_has_a_way_back_and_speaks_of_no
     expect(page).to_have_url(f"{stub.url}/")
 
 
+@pytest.mark.long
 def test_the_interface_takes_a_key_where_one_is_asked_for_and_has_the_colours_that_the_browser_prefers(tmp_path, visit):
     keys_in(tmp_path).add("reader", "read")
     service = Service(tmp_path, "serve")

@@ -74,6 +74,7 @@ def test_what_a_phone_has_folded_stays_folded_while_the_page_follows_what_happen
     expect(phone.get_by_role("link", name="opencv, camera right")).to_be_visible()
 
 
+@pytest.mark.long
 def test_the_magnification_and_its_list_stand_on_one_row_of_a_phone(real, visit):
     page = visit(real, "/ui/venues/newcomer", size=(390, 844))
     label, choice = page.locator("label[for=times]"), page.locator("#times")
@@ -93,6 +94,7 @@ def test_pictures_have_their_height_before_they_are_there(stub, visit):
     assert box["height"] == pytest.approx(box["width"] * 48 / 64, abs=2)
 
 
+@pytest.mark.long
 def test_the_magnifier_begins_on_a_line_of_the_field(real, visit):
     page = visit(real, "/ui/venues/newcomer")
     page.locator(".loupe").wait_for()
@@ -116,6 +118,7 @@ def test_the_magnifier_begins_on_a_line_of_the_field(real, visit):
     assert green > 0.7
 
 
+@pytest.mark.long
 def test_the_stitched_view_says_that_it_is_being_drawn(real, visit):
     page = visit(real)
     page.route("**/stitch/preview?*", lambda route: None)

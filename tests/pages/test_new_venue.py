@@ -32,6 +32,7 @@ def page(stub, visit):
     return page
 
 
+@pytest.mark.long
 def test_how_well_photos_know_a_lens_goes_with_it_until_somebody_changes_its_numbers(page):
     page.get_by_label("Photos of a board").check()
     page.locator("[name=photos]").set_input_files(newcomer.frame("left"))
@@ -62,11 +63,13 @@ def poses(url):
     return {camera["id"]: np.array(camera["pose"]["position"]) for camera in cameras}
 
 
+@pytest.mark.long
 def test_a_newcomer_comes_to_poses_that_are_right(real):
     for camera, position in poses(real).items():
         assert np.linalg.norm(position - newcomer.TRUTH[camera].position) < 0.05
 
 
+@pytest.mark.long
 def test_what_was_accepted_is_undone_and_restored(real, visit):
     page = visit(real, "/ui/venues/newcomer")
     accepted = poses(real)

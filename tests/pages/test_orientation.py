@@ -15,6 +15,10 @@ from tests.pages.firefox import firefox, firefox_at
 
 WIDTH, HEIGHT = SIZE
 UPRIGHT, UPSIDE_DOWN, QUARTER_TURN = 1, 3, 6
+LATER = [
+    pytest.param(kind, marks=pytest.mark.long)
+    for kind in ((".jpg", UPSIDE_DOWN), (".jpg", UPRIGHT), (".png", QUARTER_TURN))
+]
 RED_AT_LEFT = """
 canvas => {
     const pixel = (x) => [...canvas.getContext("2d").getImageData(canvas.width * x, canvas.height / 2, 1, 1).data];
@@ -43,7 +47,7 @@ def turned(suffix, orientation):
     return file[:header] + chunk + file[header:]
 
 
-@pytest.fixture(params=[(".jpg", QUARTER_TURN), (".jpg", UPSIDE_DOWN), (".jpg", UPRIGHT), (".png", QUARTER_TURN)])
+@pytest.fixture(params=[(".jpg", QUARTER_TURN), *LATER])
 def file(request, tmp_path):
     suffix, orientation = request.param
     path = tmp_path / f"left{suffix}"

@@ -6,6 +6,7 @@ import pytest
 from playwright.sync_api import expect
 
 from testbed import running
+from testbed.parameters import try_first
 from testbed.running import SIZE, Service, png, wait_for
 from tests.pages.browsing import differs, grave, list_from, look, press_and_confirm, tab, wait_until
 from tests.pages.stocked import calibrations
@@ -295,7 +296,7 @@ PAGES = {
 }
 
 
-@pytest.mark.parametrize("name", PAGES)
+@pytest.mark.parametrize("name", try_first(PAGES, 5))
 def test_nothing_serious_keeps_anybody_from_using_a_page_and_it_fits_a_phone(stub, years, ended, one_tab, name):
     stub.venue("bare")
     one_tab.set_viewport_size(DESK)

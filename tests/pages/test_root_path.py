@@ -38,6 +38,7 @@ def below(browser, proxied):
     context.close()
 
 
+@pytest.mark.long
 def test_a_venue_is_made_calibrated_and_looked_at_below_the_path(below, proxied):
     name, (page, asked) = "walked", below
     with proxied.client() as http:

@@ -13,6 +13,7 @@ from tests.e2e.commands import esc_process
 JOBS = 6
 
 
+@pytest.mark.long
 @in_both_homes
 def test_workers_of_both_versions_compute_what_apis_of_both_submit_and_an_upgrade_loses_no_job(start, release, worker):
     # Old processes begin before the schema is brought up to date: none can start after that.

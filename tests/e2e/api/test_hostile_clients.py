@@ -290,6 +290,7 @@ def test_a_packed_body_is_refused(impatient, coding):
 # What stays of it
 
 
+@pytest.mark.long
 def test_a_thousand_hostile_requests_leave_nothing_behind(impatient):
     impatient.calibrated("stadium", 200)
 

@@ -258,6 +258,7 @@ def test_alone_it_leaves_it_to_the_service_to_judge_schedules(service, program, 
     assert "'61 * * * *' is no schedule" in said
 
 
+@pytest.mark.long
 def test_programs_that_use_it_are_type_checked(python, tmp_path):
     (tmp_path / "program.py").write_text(TYPED)
     mypy = [sys.executable, "-m", "mypy", "--strict", "--python-executable", python, "--cache-dir", tmp_path / "cache"]

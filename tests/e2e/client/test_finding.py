@@ -45,6 +45,7 @@ def answered(tmp_path_factory):
     return folder, *json.loads((folder / "answer.json").read_text())
 
 
+@pytest.mark.long
 def test_cameras_of_known_lenses_are_found_and_the_venue_is_written(answered):
     folder, code, out, err = answered
     assert code == 0, err
@@ -56,6 +57,7 @@ def test_cameras_of_known_lenses_are_found_and_the_venue_is_written(answered):
     assert "assumed: it stands on the near side" in err
 
 
+@pytest.mark.long
 def test_what_was_found_calibrates(answered, tmp_path):
     folder, *_ = answered
     command = ("run", "venue.json", "left=left.jpg", "right=right.jpg", "-o", str(tmp_path / "out"))
@@ -64,12 +66,14 @@ def test_what_was_found_calibrates(answered, tmp_path):
     assert json.loads(answer.stdout)["path"] == "near"
 
 
+@pytest.mark.long
 def test_each_candidate_has_a_picture(answered):
     folder, *_ = answered
     picture = cv2.imread(str(folder / "pictures" / "candidate_left_1.jpg"))
     assert picture.shape == (SIZE[1], SIZE[0], 3)
 
 
+@pytest.mark.long
 def test_a_frame_that_shows_no_field_is_refused_with_why_and_writes_no_venue(tmp_path):
     lens = ("image_size", "intrinsics")
     write(tmp_path, site(left=lens, right=lens))

@@ -144,6 +144,7 @@ def recovering(service, name, filmed, behaviour):
             yield process
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_lost_cameras_are_calibrated_by_their_newest_pictures_and_tracked_from_there(service, name, filmed, missing):
     if not has_server():
@@ -160,6 +161,7 @@ def test_lost_cameras_are_calibrated_by_their_newest_pictures_and_tracked_from_t
     assert "New pose or lens: left, right" in told
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_a_calibration_of_lost_cameras_that_is_refused_changes_nothing_and_says_why(service, name, filmed, missing):
     if not has_server():

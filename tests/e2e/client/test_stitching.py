@@ -108,6 +108,7 @@ def shaking(tmp_path_factory):
     return [f"{camera}={path}" for camera, path in film_shaking(tmp_path_factory.mktemp("shaking")).items()]
 
 
+@pytest.mark.long
 def test_a_shaking_rig_is_followed_and_its_poses_lie_beside_the_clip(esc, tmp_path, shaking):
     (tmp_path / "venue.json").write_text(json.dumps(venue_document("windy", PITCH, pair())))
     options = ("--offset", "right=0", "--follow", "--poses-out", "poses", "--json")
@@ -128,6 +129,7 @@ def test_poses_are_those_of_followed_cameras(esc, venue_file, clips):
     assert "--poses-out and --follow-every go with --follow" in answer.stderr
 
 
+@pytest.mark.long
 def test_live_cameras_are_followed_and_their_view_is_published(esc, tmp_path, missing):
     if not has_server():
         missing("gstreamer")

@@ -17,6 +17,7 @@ from testbed.homes import on_servers
 pytestmark = pytest.mark.slow
 
 
+@pytest.mark.long
 @on_servers
 def test_a_database_that_is_away_is_a_line_a_minute_for_each_thing_that_fails_and_no_traceback(start, home):
     service = start("up", ESC_AUTH="off").ready()

@@ -142,6 +142,7 @@ def test_without_an_endpoint_nothing_that_sends_is_loaded():
     assert light.returncode == 0, light.stderr
 
 
+@pytest.mark.long
 def test_with_an_endpoint_and_without_the_extra_a_line_says_what_is_missing():
     without = python(WITHOUT_THE_EXTRA + LIGHT, OTEL_EXPORTER_OTLP_ENDPOINT="http://127.0.0.1:9")
     assert without.returncode == 0, without.stderr

@@ -166,6 +166,7 @@ def test_what_is_wrong_with_a_request_is_said_at_once(service, name):
     assert other.json()["type"] == "/problems/unknown-camera"
 
 
+@pytest.mark.long
 def test_esc_goes_from_photos_and_clicks_to_a_venue(tmp_path, photos):
     def esc(*arguments):
         command = [sys.executable, "-m", "service.cli", *arguments]

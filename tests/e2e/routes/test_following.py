@@ -14,7 +14,7 @@ import pytest
 from service import child_process
 from service.store.database import connect
 from service.store.venues import VenueRepository
-from testbed.homes import in_both_homes
+from testbed.homes import in_both_homes, in_one_home_first
 from testbed.running import DEADLINE_S, Service, venue, wait_for
 from tests.e2e.routes.event_stream import followed
 from tests.worker.receiver import LOCAL, SECRET, Receiver
@@ -64,7 +64,7 @@ def test_who_was_away_when_a_venue_was_deleted_is_told_so_once(service, name):
         assert service.http.get(f"/venues/{name}/events", headers={"Last-Event-ID": seen}).status_code == 404
 
 
-@in_both_homes
+@in_one_home_first
 def test_what_was_missed_is_told_by_another_process_after_a_restart(start):
     service = start("up").ready()
     service.venue("v")

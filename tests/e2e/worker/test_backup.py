@@ -44,6 +44,7 @@ def state(service, venue_id, job_id):
     )
 
 
+@pytest.mark.long
 def test_what_was_backed_up_while_it_ran_is_there_after_the_restore(start, shell):
     service = start("up").ready()
     done = service.submitted(service.venue("v"))

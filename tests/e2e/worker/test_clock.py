@@ -31,6 +31,7 @@ def ahead(tmp_path):
     service.kill()
 
 
+@pytest.mark.long
 def test_a_clock_that_is_put_right_by_hours_holds_up_neither_schedules_nor_jobs(ahead, camera):
     service, clock = ahead
     document = venue("scheduled", cameras=("left",)) | {"schedule": {"cron": "*/15 * * * *"}}

@@ -13,6 +13,7 @@ from service.store import tables
 from service.store.database import connect, migrate, writing
 from testbed import warm
 from testbed.homes import Embedded, environment, files
+from testbed.parameters import try_first
 from testbed.running import Service, wait_for
 from tests.e2e.commands import esc_here, esc_process
 
@@ -171,7 +172,9 @@ def home_with_files(folder, count=1500):
         (folder / "blobs" / "frames" / f"{number}").write_bytes(b"a frame")
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGINT, signal.SIGKILL], ids=lambda n: n.name)
+@pytest.mark.parametrize(
+    "number", try_first([signal.SIGKILL, signal.SIGTERM, signal.SIGHUP, signal.SIGINT]), ids=lambda n: n.name
+)
 def test_a_copy_that_is_ended_leaves_nothing_or_what_the_next_one_goes_on_with(tmp_path, number):
     here, there = tmp_path / "here", tmp_path / "there"
     home_with_files(here)
@@ -237,6 +240,7 @@ def test_a_database_that_is_not_empty_or_of_another_schema_is_refused_and_left_a
     assert esc("home", "copy", "mysql://host/name", there).returncode == 2
 
 
+@pytest.mark.long
 def test_what_fails_in_the_middle_leaves_the_target_empty(servers, esc, tmp_path):
     folder = tmp_path / "here"
     here, there = Embedded().database_url(folder), servers.settings(tmp_path / "there")

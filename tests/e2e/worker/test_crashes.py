@@ -4,10 +4,12 @@ import os
 import signal
 import time
 
+import pytest
+
 from service.serving import GRACE_S
 from testbed.books import settle
 from testbed.disks import filled
-from testbed.homes import in_both_homes, on_servers
+from testbed.homes import in_one_home_first, on_servers
 from testbed.killing import (
     chance,
     kill_api,
@@ -47,7 +49,7 @@ def test_a_killed_worker_comes_back_and_its_job_ends_once(start):
     assert service.worker() != worker
 
 
-@in_both_homes
+@in_one_home_first
 def test_a_worker_on_another_machine_takes_over(start, worker_beside):
     silence_s = 3
     service = start("serve", ESC_TAKEOVER_AFTER_S=str(silence_s))
@@ -70,7 +72,7 @@ def test_a_worker_on_another_machine_takes_over(start, worker_beside):
     assert [revision["cause"] for revision in history] == ["calibrated", "put"]
 
 
-@in_both_homes
+@in_one_home_first
 def test_a_worker_killed_at_any_moment_of_its_job_costs_it_an_attempt_and_nothing_else(start):
     service = start("up", ESC_TIDY_EVERY_S="0.5").ready()
     seconds = seconds_of_a_job(service, service.venue("alone", "accept 0.3"))
@@ -80,7 +82,7 @@ def test_a_worker_killed_at_any_moment_of_its_job_costs_it_an_attempt_and_nothin
     settle(service)
 
 
-@in_both_homes
+@in_one_home_first
 def test_a_submission_killed_at_any_moment_is_one_job_or_none(start):
     service = start("up", ESC_TIDY_EVERY_S="0.5").ready()
     seconds = seconds_of_a_submission(service, service.venue("alone"))
@@ -143,7 +145,7 @@ def test_a_program_and_a_network_that_are_not_there_are_told(start):
     wait_for(lambda: service.http.get("/readyz").json()["parts"]["model"].startswith("missing at"))
 
 
-@in_both_homes
+@in_one_home_first
 def test_while_the_database_is_away_the_service_says_so_and_a_job_goes_on(start, home):
     # Without a key to look up: otherwise it could not tell whether the caller may know.
     service = start("up", ESC_AUTH="off").ready()
@@ -169,6 +171,7 @@ def test_while_the_database_is_away_the_service_says_so_and_a_job_goes_on(start,
     service.ready()
 
 
+@pytest.mark.long
 @on_servers
 def test_a_long_absence_of_the_database_is_no_workers_death(start, home, worker_beside):
     silence_s = 3

@@ -7,7 +7,7 @@ import sqlalchemy as sa
 from service.store import tables
 from service.store.blobs import Blobs
 from testbed.books import queued
-from testbed.homes import in_both_homes
+from testbed.homes import in_one_home_first
 from testbed.running import Service, wait_for
 
 
@@ -18,7 +18,7 @@ def age(service, job: str, days: float) -> None:
         connection.execute(sa.update(tables.jobs).where(tables.jobs.c.id == job).values(finished_at=ended))
 
 
-@in_both_homes
+@in_one_home_first
 def test_a_job_that_is_deleted_takes_its_frames_and_pictures_with_it(service, name):
     job = service.calibrated(service.venue(name), headers={"Idempotency-Key": name})
     poses = service.http.get(f"/venues/{name}").json()
@@ -46,7 +46,7 @@ def test_a_job_that_is_open_is_cancelled_before_it_is_deleted(service, esc, name
     assert service.http.get(f"/jobs/{job}").status_code == 404
 
 
-@in_both_homes
+@in_one_home_first
 def test_what_is_past_its_time_goes_and_says_so(start):
     service = start("up", ESC_TIDY_EVERY_S="0.5").ready()
     service.venue("v", "reject")
@@ -72,7 +72,7 @@ def test_what_is_past_its_time_goes_and_says_so(start):
     assert service.submit("v", headers=key).status_code == 202
 
 
-@in_both_homes
+@in_one_home_first
 def test_a_picture_that_somebody_else_deleted_is_told_from_one_that_never_was(service, name):
     job = service.calibrated(service.venue(name))["id"]
     blobs = Blobs(service.blob_url)

@@ -45,6 +45,7 @@ def test_outdated_poses_are_found_again_and_stored(service, name):
         assert cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR).std() > 20
 
 
+@pytest.mark.long
 def test_a_black_frame_is_rejected_by_the_name_of_its_camera_and_the_stored_pose_stays(service, name):
     dark = {**frames(), "right": encoded(np.zeros((SIZE[1], SIZE[0], 3), np.uint8))}
     result = calibrated(service, venue(name), dark)["result"]
@@ -52,6 +53,7 @@ def test_a_black_frame_is_rejected_by_the_name_of_its_camera_and_the_stored_pose
     assert stored_position(service, name, 1) == venue(name)["cameras"][1]["pose"]["position"]
 
 
+@pytest.mark.long
 def test_a_camera_that_looks_elsewhere_than_it_is_stored_is_found_by_its_frame_and_taken(service, name):
     stored = venue(name, right_turn=np.array([1.2, 0.0, 0.0]))
     service.http.put(f"/venues/{name}", json=stored).raise_for_status()
@@ -73,6 +75,7 @@ def test_a_camera_that_looks_elsewhere_than_it_is_stored_is_found_by_its_frame_a
     assert left["pose"]["position"] == stored["cameras"][0]["pose"]["position"]
 
 
+@pytest.mark.long
 def test_a_stored_pose_that_looks_at_the_sky_is_refused_by_the_name_of_its_camera_and_the_other_is_calibrated(
     service, name
 ):
@@ -84,6 +87,7 @@ def test_a_stored_pose_that_looks_at_the_sky_is_refused_by_the_name_of_its_camer
     assert service.http.get("/readyz").status_code == 200
 
 
+@pytest.mark.long
 def test_the_measures_of_a_pitch_are_found_and_drawn(service, name):
     document = venue(name)
     document["field"] = {"length_m": 104, "width_m": 67.4, "line_width_m": 0.12}

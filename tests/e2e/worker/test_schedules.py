@@ -38,6 +38,7 @@ def push(service, name, until, answers):
             time.sleep(0.03)
 
 
+@pytest.mark.long
 @in_both_homes
 def test_a_schedule_gets_its_turn_however_many_clients_push(start, camera):
     service = start("up", ESC_QUEUE_LIMIT=str(LIMIT), ESC_SOURCES=json.dumps(["127.0.0.1"])).ready()

@@ -7,7 +7,7 @@ import pytest
 
 from service.store.database import connect
 from service.store.workers import WorkerRepository
-from testbed.homes import in_both_homes
+from testbed.homes import in_one_home_first
 from testbed.running import alive, wait_for
 from tests.e2e.commands import esc_process
 from tests.e2e.observe.figures import figures
@@ -17,7 +17,7 @@ from tests.e2e.worker.test_crashes import poses
 AT_ONCE_S = 15
 
 
-@in_both_homes
+@in_one_home_first
 def test_a_worker_that_is_stopped_lets_its_job_end_and_takes_no_other(start, worker_beside):
     service = start("serve")
     worker = worker_beside(service, "w")
@@ -31,7 +31,7 @@ def test_a_worker_that_is_stopped_lets_its_job_end_and_takes_no_other(start, wor
     assert service.job(waiting)["status"] == "queued"
 
 
-@in_both_homes
+@in_one_home_first
 def test_stops_in_the_middle_of_a_job_do_not_count_as_its_attempts(start, worker_beside):
     service = start("serve", ESC_DRAIN_S="0")
     job = service.submitted(service.venue("v", "accept 3"))
@@ -77,7 +77,7 @@ def test_poses_that_were_found_hold_though_their_pictures_cannot_be_stored(start
     assert service.http.get(f"/jobs/{job['id']}/preview.jpg").status_code == 404
 
 
-@in_both_homes
+@in_one_home_first
 def test_two_workers_of_one_name_do_not_run_on_two_machines(start, worker_beside):
     service = start("serve", ESC_TAKEOVER_AFTER_S="6")
     first = worker_beside(service, "truck", "one")

@@ -79,6 +79,7 @@ def test_a_result_that_a_person_accepts_is_the_new_anchor(stock):
     assert (point.jobs, point.across_m) == (2, pytest.approx(0.01))
 
 
+@pytest.mark.long
 def test_a_person_who_accepts_what_holds_already_says_that_the_camera_is_right_there(stock):
     venue = stock.venue("v")
     stock.venues.put(venue.model_copy(update={"alarms": Alarms(trend_m=0.03)}))
@@ -159,6 +160,7 @@ def test_a_step_is_told_with_its_size_and_its_day_and_rings_where_it_matters(sto
     assert alarms[0].why == found.words
 
 
+@pytest.mark.long
 def test_a_shift_that_is_sure_but_small_drifts_and_rings_nothing(stock):
     venue = stock.venue("v")
     stock.venues.put(venue.model_copy(update={"alarms": Alarms(trend_m=0.2)}))
@@ -199,6 +201,7 @@ def test_of_too_many_rows_the_last_of_each_day_and_the_newest_days_are_kept(stoc
     assert rows(stock) == 2 * 4
 
 
+@pytest.mark.long
 def test_what_is_usual_outlives_the_nights_that_it_was_learnt_from(stock, monkeypatch):
     monkeypatch.setattr(trends, "KEPT_ROWS", 25)
     nights(stock, 60, AUTUMN, noisy(3, lambda number: 0.0008 * number))

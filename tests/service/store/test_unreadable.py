@@ -9,7 +9,8 @@ from service.schemas.addresses import HIDDEN
 from service.schemas.source_urls import SourceSecrets
 from service.store import tables, unreadable
 from service.store.unreadable import UnreadableRow
-from testbed.homes import in_both_homes
+from testbed.homes import in_both_homes, in_one_home_first
+from testbed.parameters import try_first
 from testbed.running import venue
 from testbed.stock import result
 from tests.service.local_service import LocalService
@@ -76,7 +77,7 @@ def test_lists_name_a_venue_that_cannot_be_read_and_show_the_others(service, bro
     )
 
 
-@in_both_homes
+@in_one_home_first
 def test_alone_it_is_a_problem_that_says_what_to_do(service, broken):
     answer = service.ask("GET", broken)
     assert (answer.status_code, answer.json()["type"]) == (409, "/problems/unreadable")
@@ -95,7 +96,7 @@ def test_alone_it_is_a_problem_that_says_what_to_do(service, broken):
     assert 'esc_unreadable_rows{kind="venue"} 1.0' in service.ask("GET", "/metrics").text
 
 
-@in_both_homes
+@in_one_home_first
 @pytest.mark.parametrize("spoilt", ["ridge", "everything"])
 @pytest.mark.parametrize(("way_out", "status"), [("restore", 200), ("put", 200), ("delete", 204)])
 def test_it_is_restored_put_and_deleted(stock, service, broken, spoilt, way_out, status):
@@ -187,7 +188,7 @@ def test_a_job_that_cannot_be_read_is_listed_apart_and_deleted(stock, service):
     ],
     ids=lambda value: getattr(value, "name", value),
 )
-@pytest.mark.parametrize("rubbish", [{"left": [1]}, [3], "text"], ids=str)
+@pytest.mark.parametrize("rubbish", try_first([{"left": [1]}, [3], "text"]), ids=str)
 def test_no_other_row_of_a_venue_takes_it_down(stock, service, table, column, key, rubbish):
     stock.calibrated("v")
     report = {"host": "h", "pid": 1, "version": "0", "started_at": "2026-11-21T10:00:00Z", "cameras": []}

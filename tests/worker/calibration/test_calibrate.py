@@ -43,6 +43,7 @@ def test_what_moved_is_told():
         )
 
 
+@pytest.mark.long
 def test_the_same_seed_gives_the_same_poses_to_the_last_digit():
     again = run(seed=3)
     for first, second in zip(result().cameras, again.cameras, strict=True):
@@ -50,6 +51,7 @@ def test_the_same_seed_gives_the_same_poses_to_the_last_digit():
         np.testing.assert_array_equal(first.camera.pose.position, second.camera.pose.position)
 
 
+@pytest.mark.long
 def test_lines_that_the_network_has_never_learnt_are_found_by_their_ridges():
     def sees_nothing(frame, _):
         return np.zeros(frame.shape[:2], dtype=np.uint8)
@@ -96,6 +98,7 @@ def test_reasons_that_end_with_a_full_stop_are_joined_without_it():
     assert ".;" not in reasons
 
 
+@pytest.mark.long
 def test_what_walks_through_one_of_three_frames_does_not_matter():
     with_player = {name: [f[0].copy() for _ in range(3)] for name, f in frames().items()}
     with_player["left"][1][200:400, 500:560] = 255
@@ -104,6 +107,7 @@ def test_what_walks_through_one_of_three_frames_does_not_matter():
         assert np.linalg.norm(one.camera.pose.position - truth.pose.position) < 0.03
 
 
+@pytest.mark.long
 def test_progress_runs_through_the_stages_and_never_back():
     steps = []
     calibrate(CROWNED, outdated(), frames(), white_on_green, Options(generations=10), steps.append)
@@ -128,6 +132,7 @@ def with_longer_lens(camera, by):
     return free_focal_lengths([camera])[0].applied([camera], CROWNED, by)[0][0]
 
 
+@pytest.mark.long
 def test_a_focal_length_that_heat_has_changed_is_found_when_asked_for():
     left, right = outdated()
     found = run(cameras=[with_longer_lens(left, 2.0), right], fit_focal_length=True)
@@ -146,6 +151,7 @@ def test_a_lens_that_is_not_the_one_that_was_given_is_suspected_with_its_numbers
     assert result().suspicions == []
 
 
+@pytest.mark.long
 def test_a_flat_pitch_that_is_crowned_is_told_with_how_far_the_true_ridge_moves_the_cameras():
     flat = calibrate(CROWNED.flat(), outdated(), frames(), white_on_green, Options(seed=3))
     (ridge,) = [one for one in flat.suspicions if one.camera is None]
@@ -166,6 +172,7 @@ def test_a_ridge_below_the_ground_is_rejected():
     assert ridge_rejection(CROWNED.flat()) is None
 
 
+@pytest.mark.long
 def test_a_camera_that_sees_something_else_is_rejected_and_says_nothing_of_its_lens():
     elsewhere = {**frames(), "left": (np.ascontiguousarray(frames()["left"][0][::-1, ::-1]),)}
     found = run(pictures=elsewhere, recover="never")
@@ -173,6 +180,7 @@ def test_a_camera_that_sees_something_else_is_rejected_and_says_nothing_of_its_l
     assert {s.camera for s in found.suspicions} <= {"right"}
 
 
+@pytest.mark.long
 def test_the_loss_is_that_of_the_poses_that_are_answered():
     steps = []
     found = calibrate(CROWNED, outdated(), frames(), white_on_green, Options(seed=3, generations=10), steps.append)

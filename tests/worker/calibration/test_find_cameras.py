@@ -70,6 +70,7 @@ def test_each_camera_that_is_searched_for_says_how_long_the_others_will_take():
     assert second > 0
 
 
+@pytest.mark.long
 def test_a_camera_is_found_beside_one_that_is_known():
     left, right = pair()
     found = find_cameras(CROWNED, [sought(right)], [left], frames(), white_on_green, 1)
@@ -79,6 +80,7 @@ def test_a_camera_is_found_beside_one_that_is_known():
     assert np.linalg.norm(camera.candidates[0].camera.pose.position - right.pose.position) < 0.03
 
 
+@pytest.mark.long
 def test_a_camera_on_a_stand_opposite_is_found_there_by_the_ground_that_both_see():
     left, _ = pair()
     # Its twin stands 2 m from the other camera.
@@ -91,6 +93,7 @@ def test_a_camera_on_a_stand_opposite_is_found_there_by_the_ground_that_both_see
     assert "looks as camera left sees it" in found.cameras[1].remarks[0]
 
 
+@pytest.mark.long
 def test_the_crown_of_a_field_that_is_given_flat_is_found_with_the_cameras():
     found = find_cameras(CROWNED.flat(), [sought(one) for one in pair()], [], frames(), white_on_green, 1)
     assert found.pitch.ridge_height == pytest.approx(CROWNED.ridge_height, abs=0.02)
@@ -99,6 +102,7 @@ def test_the_crown_of_a_field_that_is_given_flat_is_found_with_the_cameras():
         assert np.linalg.norm(camera.candidates[0].camera.pose.position - truth.pose.position) < 0.03
 
 
+@pytest.mark.long
 def test_a_flat_field_stays_flat_and_a_field_with_a_known_camera_as_it_is_given():
     left, right = pair()
     on_the_flat = paint_frame(PITCH, left)

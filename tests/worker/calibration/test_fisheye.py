@@ -156,6 +156,7 @@ def pair():
     ]
 
 
+@pytest.mark.long
 def test_outdated_poses_of_fisheyes_are_found_again_and_drawn():
     cameras = pair()
     frames = {camera.id: (paint_frame(CROWNED, camera),) for camera in cameras}

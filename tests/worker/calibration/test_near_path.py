@@ -52,6 +52,7 @@ def test_they_are_found_where_a_search_finds_them():
         assert short.sigma.position_m == pytest.approx(long.sigma.position_m, rel=0.05)
 
 
+@pytest.mark.long
 def test_cameras_whose_lines_are_faint_are_found_where_a_search_finds_them():
     left, frame = pair()[0], pair_frames()[0]
     ground = np.median(frame.reshape(-1, 3), axis=0)
@@ -73,12 +74,14 @@ def test_cameras_whose_lines_are_faint_are_found_where_a_search_finds_them():
         assert np.linalg.norm(short.camera.pose.position - long.camera.pose.position) < 1e-3
 
 
+@pytest.mark.long
 def test_cameras_that_moved_far_are_searched_for():
     found = calibrated(by=STORM)
     assert (found.path, found.verdict) == ("wide", "accepted")
     assert off_m(found) < 0.02
 
 
+@pytest.mark.long
 def test_what_a_search_would_refuse_is_not_accepted_nearby():
     found = calibrated(frames={"left": [paint_frame(Field(92.0, 50.0), pair()[0])]}, generations=20, recover="never")
     assert (found.path, found.verdict) == ("wide", "rejected")
@@ -94,6 +97,7 @@ def test_a_camera_whose_frame_is_of_no_use_does_not_have_the_other_one_searched_
     assert np.linalg.norm(left.camera.pose.position - pair()[0].pose.position) < 0.02
 
 
+@pytest.mark.long
 def test_only_the_camera_that_was_turned_is_searched_for():
     frames = {one.id: [frame] for one, frame in zip(pair(), pair_frames(), strict=True)}
     left, right = pair()
@@ -133,6 +137,7 @@ def test_the_network_sees_no_more_than_overviews_where_lines_suffice():
     assert [found.responses[one.id].shape[1] for one in pair()] == [OVERVIEW_WIDTH_PX] * 2
 
 
+@pytest.mark.long
 def test_the_network_looks_in_full_at_a_camera_whose_lines_do_not_suffice():
     left, right = pair_frames()
     hidden = right.copy()
@@ -143,6 +148,7 @@ def test_the_network_looks_in_full_at_a_camera_whose_lines_do_not_suffice():
     assert found.cameras[0].accepted
 
 
+@pytest.mark.long
 def test_the_network_looks_in_full_where_an_overview_shows_most_lines_elsewhere():
     striped = pair_frames()[0].copy()
     # White as the venue's lines: what is measured on those says nothing of it.
@@ -160,6 +166,7 @@ def test_nobody_is_told_of_looking_nearby_in_vain():
     assert list(dict.fromkeys(step.stage for step in steps)) == ["segmentation", "evolution", "refinement"]
 
 
+@pytest.mark.long
 def test_the_same_frames_sent_again_change_nothing():
     frames = {one.id: [frame] for one, frame in zip(pair(), pair_frames(), strict=True)}
     first = again = nearby()

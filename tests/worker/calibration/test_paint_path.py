@@ -52,6 +52,7 @@ def test_a_camera_is_found_by_the_lines_of_its_own_sport():
     assert off_px(calibrated()) < 0.5
 
 
+@pytest.mark.long
 def test_of_several_frames_the_paint_is_seen_in_one():
     frames = {"hall": [frame(), frame()]}
     result = calibrate(NETBALL, [STORED], frames, Segmenter(MODEL_PATH, 1), Options()).cameras[0]

@@ -81,6 +81,7 @@ def accepted():
     return calibrate(CROWNED, knocked_venue(), frames(), white_on_green, options, memories=before)
 
 
+@pytest.mark.long
 def test_a_camera_that_was_turned_on_its_pole_is_found_and_proposed_with_how_far_it_turned():
     left, _ = proposed().cameras
     truth, _ = pair()
@@ -92,6 +93,7 @@ def test_a_camera_that_was_turned_on_its_pole_is_found_and_proposed_with_how_far
     assert proposed().path == "anywhere"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("rolled_deg", [-12.0, 25.0, 40.0])
 @pytest.mark.parametrize("recover", ["propose", "accept"])
 def test_a_camera_that_was_rolled_about_its_view_is_knocked_and_nothing_else(rolled_deg, recover):
@@ -103,6 +105,7 @@ def test_a_camera_that_was_rolled_about_its_view_is_knocked_and_nothing_else(rol
     assert rotation_angles_deg(found.camera.pose.rotation, left.pose.rotation) < 0.05
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("recover", ["propose", "accept"])
 def test_a_camera_that_only_moved_too_far_is_proposed_as_knocked_though_no_search_finds_it(monkeypatch, recover):
     """Found around where it stood, by the evolution strategy; no search has shown that no other pose explains it."""
@@ -115,12 +118,14 @@ def test_a_camera_that_only_moved_too_far_is_proposed_as_knocked_though_no_searc
     assert rotation_angles_deg(found.camera.pose.rotation, left.pose.rotation) < 0.05
 
 
+@pytest.mark.long
 def test_a_camera_that_moved_too_far_is_no_proposal_where_the_venue_wants_none():
     left, _ = pair()
     (found,) = run([turned(left, 8.5)], {"left": frames()["left"]}, seed=3, recover="never", generations=100).cameras
     assert (found.refusal.reason, found.knocked) == ("moved", False)
 
 
+@pytest.mark.long
 def test_a_search_anywhere_does_not_look_at_the_clock(monkeypatch):
     """The same frames and seed have the same answer on every machine."""
     places = []
@@ -135,6 +140,7 @@ def test_a_search_anywhere_does_not_look_at_the_clock(monkeypatch):
     assert [place.is_anywhere for place in places] == [False, True]
 
 
+@pytest.mark.long
 def test_a_proposal_moves_no_other_camera_and_leaves_nothing_to_remember():
     _, right = proposed().cameras
     assert right.accepted
@@ -144,6 +150,7 @@ def test_a_proposal_moves_no_other_camera_and_leaves_nothing_to_remember():
     assert apart_m < 0.01
 
 
+@pytest.mark.long
 def test_where_the_venue_accepts_it_the_pose_holds_and_its_memory_begins_there():
     left, right = accepted().cameras
     assert left.accepted
@@ -154,6 +161,7 @@ def test_where_the_venue_accepts_it_the_pose_holds_and_its_memory_begins_there()
     assert accepted().stitch_error_px < 0.2
 
 
+@pytest.mark.long
 def test_a_camera_that_was_found_and_has_another_fault_is_refused_for_that_with_how_far_it_turned():
     left, _ = proposed().cameras
     zoomed = replace(left, knocked=False, refusal=Refusal("zoomed", "its focal length is 3 % longer."))
@@ -164,15 +172,18 @@ def test_a_camera_that_was_found_and_has_another_fault_is_refused_for_that_with_
     assert told.refusal.words.endswith("found again there, but its focal length is 3 % longer.")
 
 
+@pytest.mark.long
 def test_the_memory_of_a_camera_from_before_a_knock_is_forgotten():
     assert accepted().memories["left"].jobs == 1
 
 
+@pytest.mark.long
 def test_a_search_around_the_stored_poses_alone_can_be_asked_for():
     (left,) = run(knocked_venue()[:1], {"left": frames()["left"]}, seed=3, search="wide").cameras
     assert left.refusal.reason == "lines"
 
 
+@pytest.mark.long
 def test_a_good_job_and_a_dark_frame_cost_no_search():
     network = CountingNetwork()
     assert run(outdated(), network=network, seed=3).accepted
@@ -193,6 +204,7 @@ def test_a_frame_without_lines_is_looked_at_once_more_and_not_searched(monkeypat
     assert not found.accepted
 
 
+@pytest.mark.long
 def test_what_hardly_agrees_with_the_lines_is_not_refined(monkeypatch):
     """Strokes of paint in all directions are seen from nowhere."""
     refined, rng = [], np.random.default_rng(2)
@@ -205,6 +217,7 @@ def test_what_hardly_agrees_with_the_lines_is_not_refined(monkeypatch):
     assert refined == []
 
 
+@pytest.mark.long
 def test_an_upside_down_frame_is_neither_accepted_nor_proposed():
     upside_down = {"left": (np.ascontiguousarray(frames()["left"][0][::-1]),)}
     (found,) = run([outdated()[0]], upside_down, seed=3).cameras
@@ -265,6 +278,7 @@ def before_a_bright_sky(frame):
     return bright
 
 
+@pytest.mark.long
 def test_a_camera_that_was_knocked_until_its_field_lies_where_the_sky_is_blinded_is_found():
     left = pair()[0]
     upwards = np.array([np.radians(16.0), 0.0, 0.0])
@@ -334,6 +348,7 @@ def test_a_camera_that_was_knocked_in_the_dusk_is_found_where_noise_does_not_hid
     assert rotation_angles_deg(found.camera.pose.rotation, left.pose.rotation) < 0.2
 
 
+@pytest.mark.long
 def test_a_camera_that_was_accepted_a_line_aside_is_searched_for_and_put_right():
     """Of a tennis court, whose sidelines are taken for one another: accepted with 61 % of its lines."""
     size = (640, 640)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from fields.template import load
+from testbed.parameters import try_first
 from testbed.synthetic import camera, moved
 from tests.worker.calibration.outdated_pair import SHIFT, TURN, white_on_green
 from tests.worker.calibration.sports import SPORTS, cameras, field, frames
@@ -16,7 +17,7 @@ from worker.calibration.rendering.stitched_pictures import birdseye
 
 pytestmark = pytest.mark.slow
 
-every_sport = pytest.mark.parametrize("sport", SPORTS)
+every_sport = pytest.mark.parametrize("sport", try_first(SPORTS))
 
 
 @every_sport

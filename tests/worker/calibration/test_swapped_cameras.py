@@ -28,12 +28,14 @@ def test_exchanged_cameras_are_named_each_after_the_other_and_are_no_knock():
         np.testing.assert_array_equal(one.camera.pose.position, before.pose.position)
 
 
+@pytest.mark.long
 def test_a_frame_that_was_sent_for_two_cameras_is_refused_for_the_one_it_is_not_of():
     found = run(pictures={"left": frames()["right"], "right": frames()["right"]})
     assert reasons(found) == [OTHER_CAMERA, None]
     assert "was a frame of right sent for both" in found.cameras[0].rejected_because
 
 
+@pytest.mark.long
 def test_cameras_that_are_near_are_not_searched_for_beside_a_frame_that_was_sent_twice():
     left, right = pair()
     third = camera("third", (30.0, -46.0, 12.0), (38.0, -6.0))
@@ -47,6 +49,7 @@ def test_a_frame_that_its_own_camera_explains_is_never_called_anothers():
     assert reasons(result()) == [None, None]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("spoiled", [np.zeros_like, lambda frame: np.full_like(frame, 128)])
 def test_a_spoiled_frame_is_not_called_anothers(spoiled):
     found = run(pictures={**frames(), "left": (spoiled(frames()["left"][0]),)})
@@ -54,6 +57,7 @@ def test_a_spoiled_frame_is_not_called_anothers(spoiled):
     assert found.cameras[1].accepted
 
 
+@pytest.mark.long
 def test_a_camera_that_was_turned_to_where_its_neighbour_looks_is_not_called_the_neighbour():
     """Both hang on one mast, a metre apart: what tells them apart is where the view was taken from."""
     left, right = pair()

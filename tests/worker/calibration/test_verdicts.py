@@ -84,6 +84,7 @@ def test_where_no_frame_can_be_used_nothing_is_searched_and_all_are_rejected() -
     assert found.stitch_error_px is None
 
 
+@pytest.mark.long
 def test_two_good_cameras_of_four_are_accepted_and_the_others_that_see_something_else_do_not_drag_them_along() -> None:
     other = {one.id: paint_frame(field("volleyball"), one) for one in court() if one.id in ("nw", "se")}
     found = run(court, by=0.5, recover="propose", **other)
@@ -95,6 +96,7 @@ def test_two_good_cameras_of_four_are_accepted_and_the_others_that_see_something
     assert found.stitch_error_px < 0.3
 
 
+@pytest.mark.long
 def test_a_camera_that_the_others_contradict_is_finished_apart_from_them(monkeypatch) -> None:
     finished = []
 

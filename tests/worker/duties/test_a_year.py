@@ -91,6 +91,7 @@ def smeared(frame: np.ndarray) -> np.ndarray:
     return dirty.astype(np.uint8)
 
 
+@pytest.mark.long
 def test_nights_add_up_and_go_on_when_the_refined_lens_is_stored(year, stock):
     for night in range(3):
         year.pass_(1)
@@ -109,6 +110,7 @@ def test_nights_add_up_and_go_on_when_the_refined_lens_is_stored(year, stock):
     assert [one.nights for one in year.last.cameras] == [4, 4]
 
 
+@pytest.mark.long
 def test_bad_frames_leave_the_stored_poses_as_they_are_and_each_alarm_sounds_once(year):
     """Four days of the year below, which is not of every run of the tests.
 

@@ -27,6 +27,7 @@ def said_to_be_flat(stock):
         yield year
 
 
+@pytest.mark.long
 def test_the_ridge_is_offered_and_with_it_the_next_night_fits_better(said_to_be_flat, stock):
     year = said_to_be_flat
     frames = frames_of(cameras())

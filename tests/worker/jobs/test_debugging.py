@@ -33,26 +33,28 @@ def smaller_demo():
     return VenueIn.model_validate(venue).to_venue(), files
 
 
-@pytest.fixture(scope="module")
-def runs():
+def solved(recorder=None):
     venue, files = smaller_demo()
     resources, options = ComputeResources(model=MODEL_BESIDE_THE_CODE, threads=1), Options(seed=1, search="wide")
+    return solve(venue, files, options, resources, lambda _: None, recorder=recorder).result
+
+
+@pytest.fixture(scope="module")
+def recorded():
+    """The result of a job, and the files that its recorder left."""
     recorder = DebugRecorder()
-    plain, recorded = (
-        solve(venue, files, options, resources, lambda _: None, **recording).result
-        for recording in ({}, {"recorder": recorder})
-    )
-    return plain, recorded, recorder.files
+    return solved(recorder), recorder.files
 
 
-def test_the_result_is_the_same_with_a_recorder(runs):
-    plain, recorded, _ = runs
-    assert recorded.cameras == plain.cameras
-    assert recorded.loss == plain.loss
+@pytest.mark.long
+def test_the_result_is_the_same_with_a_recorder(recorded):
+    plain, (result, _) = solved(), recorded
+    assert result.cameras == plain.cameras
+    assert result.loss == plain.loss
 
 
-def test_each_stage_left_its_files_and_the_index_says_what_they_are(runs):
-    files = runs[2]
+def test_each_stage_left_its_files_and_the_index_says_what_they_are(recorded):
+    files = recorded[1]
     expected = {f"{camera}.{kind}" for camera in ("left", "right") for kind in OF_CAMERA} | {"search.json"}
     assert set(files) == expected | {"index.json"}
     index = json.loads(files["index.json"])["files"]
@@ -69,10 +71,10 @@ def test_each_stage_left_its_files_and_the_index_says_what_they_are(runs):
 
 
 @pytest.mark.parametrize("camera", ["left", "right"])
-def test_lines_lie_on_the_paint_and_their_residuals_shrink(runs, camera):
-    lines = json.loads(runs[2][f"{camera}.lines.json"])
+def test_lines_lie_on_the_paint_and_their_residuals_shrink(recorded, camera):
+    lines = json.loads(recorded[1][f"{camera}.lines.json"])
     assert lines["rms_px"] < 0.2 * lines["rms_before_px"]
-    response = cv2.imdecode(np.frombuffer(runs[2][f"{camera}.response.png"], np.uint8), cv2.IMREAD_GRAYSCALE)
+    response = cv2.imdecode(np.frombuffer(recorded[1][f"{camera}.response.png"], np.uint8), cv2.IMREAD_GRAYSCALE)
     frame = cv2.imdecode(np.frombuffer(smaller_demo()[1][camera][0], np.uint8), cv2.IMREAD_GRAYSCALE)
     scale = response.shape[1] / frame.shape[1]
     column, row = np.rint((np.array(lines["pixel"]) + 0.5) * scale - 0.5).astype(int).T
@@ -81,7 +83,7 @@ def test_lines_lie_on_the_paint_and_their_residuals_shrink(runs, camera):
     assert np.max(np.abs(lines["ground_height_m"])) < 0.2
 
 
-def test_each_level_of_the_search_left_its_candidates(runs):
-    levels = json.loads(runs[2]["search.json"])["levels"]
+def test_each_level_of_the_search_left_its_candidates(recorded):
+    levels = json.loads(recorded[1]["search.json"])["levels"]
     assert [level["level"] for level in levels[:3]] == [0, 1, 2]
     assert all(len(camera["candidates"][0]) == len(camera["best"]) == 6 for camera in levels[0]["cameras"])

@@ -21,6 +21,7 @@ from service.schemas.geometry import Light, Pose
 from service.schemas.programs.stitching import StitchRequest
 from service.schemas.venue import VenueIn
 from service.schemas.view import ViewChoice
+from testbed.parameters import try_first
 from testbed.synthetic import PITCH, camera, paint_frame
 from worker.calibration.geometry.lens import Fisheye
 from worker.calibration.stitching.panorama import BACKDROP
@@ -93,7 +94,7 @@ SCENES = {
 }
 
 
-@pytest.fixture(params=SCENES)
+@pytest.fixture(params=try_first(SCENES, 2))
 def scene(request):
     return SCENES[request.param]
 

@@ -59,6 +59,7 @@ def forget(tracking):
         tracking.poses.get()
 
 
+@pytest.mark.long
 def test_a_camera_whose_pictures_stay_away_or_whose_connection_breaks_is_tracked_again(camera):
     cameras, tracking = camera
     cameras.happen("pull", 0)
@@ -81,6 +82,7 @@ def test_a_frozen_picture_is_not_measured_until_it_moves_again(camera):
     measured(tracking)
 
 
+@pytest.mark.long
 def test_a_camera_that_was_knocked_is_lost_and_never_said_to_be_measured_where_it_is_not(camera, films):
     cameras, tracking = camera
     cameras.happen("clip", 0, films / "knocked")

@@ -129,6 +129,7 @@ def test_a_pose_that_is_told_ahead_is_of_a_time_after_its_picture():
     assert pose.at_ns - pose.arrived_ns == 120_000_000
 
 
+@pytest.mark.long
 def test_a_frozen_picture_is_said_and_measured_once(tmp_path):
     clip = film_shaking(tmp_path, frozen_for=150)[TRUE.id]
     with Tracking(clip) as tracking:
@@ -190,6 +191,7 @@ def streamed(clip, port):
             process.kill()
 
 
+@pytest.mark.long
 def test_a_live_stream_is_tracked_and_again_after_it_was_cut(clip, missing, monkeypatch):
     if shutil.which("ffmpeg") is None:
         missing("ffmpeg")

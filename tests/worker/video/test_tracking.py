@@ -41,6 +41,7 @@ def unrest(path):
     return float(np.sqrt(np.mean((pictures - usual)[:, lines] ** 2)))
 
 
+@pytest.mark.long
 def test_the_view_of_a_shaking_rig_stands_still(clips, tmp_path):
     moments = []
     following = TrackedGeometryFactory(1, lambda moment, rate: moments.append((moment, rate)))

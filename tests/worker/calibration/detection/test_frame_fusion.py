@@ -74,6 +74,7 @@ def brightness(pictures, swayed):
     return median([picture[..., GREEN] for picture in pictures], swayed)
 
 
+@pytest.mark.long
 def test_how_far_a_camera_turned_in_each_frame_is_found_to_a_twentieth_of_a_pixel():
     for sway, turn in zip(found(), TURNS - TURNS.mean(axis=0), strict=True):
         expected = Sway.from_turn(turn, ON_A_MAST.intrinsics).shift

@@ -12,6 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 from fields.template import load
+from testbed.parameters import try_first
 from testbed.synthetic import CROWNED, PITCH, camera, moved, paint_markings, pair
 from tests.scenes import apart, narrow_overlap
 from worker.calibration.diagnostics.registration import (
@@ -74,7 +75,7 @@ def test_a_camera_moved_sideways_shows_by_how_much() -> None:
     assert (found.dx_px, found.dy_px) == pytest.approx((2.0, 0.0), abs=0.05)
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", try_first(range(3)))
 @pytest.mark.parametrize(("turn_rad", "tolerance"), [(0.001, 0.1), (0.004, 0.15), (0.01, 0.8)])
 def test_wrong_poses_show_how_far_apart_they_put_the_centre(seed: int, turn_rad: float, tolerance: float) -> None:
     random = np.random.default_rng(seed)
@@ -157,6 +158,7 @@ def test_noise_is_no_marking() -> None:
     assert register_pair(PITCH, LEFT, RIGHT, *noise) is None
 
 
+@pytest.mark.long
 def test_the_number_of_threads_changes_no_digit() -> None:
     program = (
         "import sys, cv2; cv2.setNumThreads(int(sys.argv[1]))\n"
@@ -190,6 +192,7 @@ def test_a_halfway_line_that_has_slid_along_itself_is_no_registration(degrees: f
     assert shares_plenty(PITCH, LEFT, pitched)
 
 
+@pytest.mark.long
 def test_where_nothing_holds_the_views_along_a_line_the_displacement_across_it_is_told() -> None:
     # A side line 10 m away does not: a camera can turn and move so that only the centre line slides along itself.
     handball = Field(40.0, 20.0, 0.05, template=load("handball"))

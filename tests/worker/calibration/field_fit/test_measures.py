@@ -62,6 +62,7 @@ def test_the_sigmas_of_what_is_found_are_worth_having():
     assert measures["ridge_length_m"].sigma < 8
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("name", "given"), [("length_m", 104.0), ("width_m", 67.5)])
 def test_what_no_line_in_view_depends_on_is_unknowable_and_stays(name, given):
     refined, measures = centre_only()
@@ -104,6 +105,7 @@ def test_where_one_camera_sees_nothing_no_measure_is_known_and_it_alone_is_named
     assert found.measures[3].value == found.measures[3].given == 37.0
 
 
+@pytest.mark.long
 def test_a_handball_court_that_is_narrower_than_said_is_found_though_it_has_fewer_dashes():
     truth = Field(39.8, 19.6, 0.05, template=load("handball"))
     given = Field(40.0, 20.0, 0.05, template=load("handball"))

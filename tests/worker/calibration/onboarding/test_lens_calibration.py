@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
+from testbed.parameters import try_first
 from worker.calibration.geometry.lens import LENSES
 from worker.calibration.geometry.rotation import rotation_matrices
 from worker.calibration.onboarding.boards import Board, BoardDetection, Charuco, find_board, other_size
@@ -140,7 +141,7 @@ def test_blur_is_measured():
     assert soft > 2 * sharp
 
 
-@pytest.mark.parametrize(("model", "truth"), [("opencv", PINHOLE), ("fisheye", FISHEYE)])
+@pytest.mark.parametrize(("model", "truth"), try_first([("opencv", PINHOLE), ("fisheye", FISHEYE)]))
 def test_the_lens_is_found_within_what_is_said_of_it(model, truth):
     found = calibrated(model)
     assert found.lens.model == model
@@ -159,6 +160,7 @@ def test_the_lens_is_found_within_what_is_said_of_it(model, truth):
     assert not [verdict for verdict in found.photos if verdict.fate != "used"]
 
 
+@pytest.mark.long
 def test_terms_that_foretell_nothing_are_left_out_and_it_is_said():
     found = calibrated()
     assert found.terms == ("f", "cx", "cy", "k1", "k2")
@@ -175,6 +177,7 @@ def test_the_lens_says_how_well_it_is_known_by_the_worse_of_two_opinions():
     assert found.lens.sigma == {"fx": focal, "fy": focal} | worse
 
 
+@pytest.mark.long
 def test_a_principal_point_that_was_left_in_the_middle_is_known_as_well_as_photos_would_know_it():
     middle = LENSES["opencv"](
         np.array([[900.0, 0, 639.5], [0, 900, 479.5], [0, 0, 1]]), np.array([-0.2, 0, 0, 0]), SIZE
@@ -194,6 +197,7 @@ def test_how_well_the_ratio_of_both_focal_lengths_is_known_is_told_where_both_ar
     assert "f" not in sigma
 
 
+@pytest.mark.long
 def test_stretched_pixels_are_noticed():
     stretched = LENSES["opencv"](PINHOLE.matrix * [[1.0], [0.75], [1.0]], PINHOLE.distortion, SIZE)
     seen = [corners_seen(stretched, *place, 0.2, np.random.default_rng(i)) for i, place in enumerate(places(12))]
@@ -201,6 +205,7 @@ def test_stretched_pixels_are_noticed():
     assert found.lens.matrix[1, 1] / found.lens.matrix[0, 0] == pytest.approx(0.75, abs=0.005)
 
 
+@pytest.mark.long
 def test_a_photo_that_hurts_is_named_and_left_out():
     given = photos()
     bent = given[3].detection
@@ -229,6 +234,7 @@ def test_too_few_photos_are_refused_with_what_to_do():
         calibrate_lens([Photo("empty.jpg", SIZE, None)], "opencv")
 
 
+@pytest.mark.long
 def test_a_board_in_one_corner_of_the_picture_is_warned_of():
     found = from_the_left()
     assert found.coverage.share < 0.7

@@ -32,6 +32,7 @@ def calibrated(preset):
     return found, recorder
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("preset", PRESETS)
 def test_every_camera_is_left_where_the_search_ends(preset):
     found, recorder = calibrated(preset)
@@ -42,11 +43,13 @@ def test_every_camera_is_left_where_the_search_ends(preset):
         np.testing.assert_array_equal(result.camera.pose.position, best.pose.position)
 
 
+@pytest.mark.long
 def test_its_predecessor_takes_the_ground_for_a_plane():
     assert calibrated("paper")[0].pitch.ridge is not None
     assert calibrated("scpr")[0].pitch.ridge is None
 
 
+@pytest.mark.long
 def test_a_black_frame_leaves_its_camera_at_the_stored_pose():
     left, right = frames()["left"], (np.zeros_like(frames()["right"][0]),)
     found = calibrate_by_paper(

@@ -24,6 +24,7 @@ def test_the_papers_objective_prefers_the_truth_too(blurs):
     assert truth < 0.7
 
 
+@pytest.mark.long
 def test_the_papers_objective_sees_a_crown_through_its_planes():
     cameras, responses = scene()
     with_roof = GroundObjective(CROWNED, cameras, responses, 0.5, BROAD)

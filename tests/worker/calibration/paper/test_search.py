@@ -12,6 +12,7 @@ from worker.calibration.search.search import Strategy
 pytestmark = pytest.mark.slow
 
 
+@pytest.mark.long
 def test_a_camera_is_caught_that_is_as_far_off_as_the_papers():
     camera, markings = pair()[0], pair_markings()[0]
     start = camera.with_pose(outdated(camera.pose, 0.162, 2.1, np.random.default_rng(3)))
@@ -24,6 +25,7 @@ def test_a_camera_is_caught_that_is_as_far_off_as_the_papers():
     assert rotation_angles_deg(found.pose.rotation, camera.pose.rotation) < 0.5
 
 
+@pytest.mark.long
 def test_all_generations_are_used_even_where_nothing_moves():
     steps = []
     found = search_on_ground(

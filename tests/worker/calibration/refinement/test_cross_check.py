@@ -25,6 +25,7 @@ def checked(painted, rng, noise_px=0.2):
     return refine(SQUARE, [camera], sight, 0.5).each[0].cross_checked()
 
 
+@pytest.mark.long
 def test_over_many_fields_the_halves_differ_by_what_their_sigmas_say():
     rng = np.random.default_rng(3)
     checks = [checked(Painted.drawn(PITCH, rng), rng) for _ in range(NIGHTS)]

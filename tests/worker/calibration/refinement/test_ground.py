@@ -46,6 +46,7 @@ def off_m(found):
     return float(np.linalg.norm(found.camera.pose.position - hall_camera().pose.position))
 
 
+@pytest.mark.long
 def test_in_a_hall_errors_are_as_large_as_the_sigmas_say():
     rng = np.random.default_rng(2)
     nights = [drawn_as_expected(HALL, rng) for _ in range(NIGHTS)]

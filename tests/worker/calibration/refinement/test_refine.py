@@ -162,6 +162,7 @@ def test_the_stitch_term_holds_together_what_a_wrong_lens_pulls_apart():
     assert together.error_px < 0.6 * alone.error_px
 
 
+@pytest.mark.long
 def test_cameras_that_need_not_agree_end_as_each_does_by_itself():
     stored, begun, sight = [moved(c, by=(0.3, 0.0, 0.0)) for c in pair()], a_little_off(), pair_observed()
     together = refine(CROWNED, begun, sight, 0.0, stored=stored)
@@ -214,6 +215,7 @@ def test_blue_and_red_that_the_lens_puts_elsewhere_move_no_line(colour):
     np.testing.assert_array_equal(measured().pixel, measured(frame=fringed).pixel)
 
 
+@pytest.mark.long
 def test_the_end_is_the_same_from_both_sides_where_the_model_is_wrong():
     cameras = pair()
     wrong = Field(CROWNED.length, CROWNED.width, CROWNED.line_width, CROWNED.ridge + [0.0, 0.0, 0.3])
@@ -250,6 +252,7 @@ def test_a_ridge_that_is_left_free_is_found_with_the_poses(start):
     assert found.pitch.ridge[:, 2] == pytest.approx([0.35, 0.35], abs=0.03)
 
 
+@pytest.mark.long
 def test_a_ground_that_swells_is_found_and_does_not_move_the_cameras():
     cameras = pair()
     uneven = CROWNED.raised(0.0)

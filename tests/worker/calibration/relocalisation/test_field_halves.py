@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from testbed.parameters import try_first
 from testbed.synthetic import PITCH, camera, paint_frame, worn
 from worker.calibration.relocalisation.field_halves import choose_sides, side_of
 from worker.calibration.relocalisation.relocalise import twin
@@ -65,7 +66,7 @@ def seen_by(*cameras):
     return SharedGround.of(PITCH, {one.id: worn(PITCH, one, paint_frame(PITCH, one)) for one in cameras})
 
 
-@pytest.mark.parametrize("found", [FACING, twin(FACING)])
+@pytest.mark.parametrize("found", try_first([twin(FACING), FACING]))
 def test_a_camera_stands_where_the_ground_looks_as_another_one_sees_it_even_opposite_it(found):
     chosen = choose_sides([LEFT, found], anywhere(LEFT, found), [], seen_by(LEFT, FACING))
     np.testing.assert_allclose(chosen[1].camera.pose.position, FACING.pose.position)
@@ -73,6 +74,7 @@ def test_a_camera_stands_where_the_ground_looks_as_another_one_sees_it_even_oppo
     assert "stand on the far side: from there the ground between the lines looks as camera left" in chosen[1].remark
 
 
+@pytest.mark.long
 def test_a_camera_opposite_another_one_is_not_taken_to_stand_beside_it_where_the_ground_speaks_against_that():
     # Correlations of 0.3 decide nothing, and are more than none.
     worn_frame = worn(PITCH, FACING, paint_frame(PITCH, FACING))

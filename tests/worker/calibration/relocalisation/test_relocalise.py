@@ -6,6 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from testbed.parameters import try_first
 from testbed.synthetic import BARREL, PITCH, camera, paint_frame
 from tests.worker.calibration.outdated_pair import white_on_green
 from tests.worker.calibration.sports import field
@@ -60,7 +61,7 @@ def off_px(pitch, truth, best):
 
 
 @pytest.mark.parametrize(
-    ("sport", "truth"), [("football", "SIDELINE"), ("football", "BEHIND_A_GOAL"), ("basketball", "COURT")]
+    ("sport", "truth"), try_first([("football", "SIDELINE"), ("football", "BEHIND_A_GOAL"), ("basketball", "COURT")])
 )
 def test_a_camera_of_a_known_lens_is_found(sport, truth):
     pitch, camera, answer = found(sport, truth, lens_is_known=True)
@@ -68,6 +69,7 @@ def test_a_camera_of_a_known_lens_is_found(sport, truth):
     assert off_px(pitch, camera, answer.candidates[0].camera) < 0.5
 
 
+@pytest.mark.long
 def test_paint_that_the_network_is_hardly_sure_of_is_searched_too():
     pitch, camera = PITCH, SIDELINE
     answer = search(pitch, camera, paint_frame(pitch, camera), sureness=np.float32(0.6))
@@ -75,6 +77,7 @@ def test_paint_that_the_network_is_hardly_sure_of_is_searched_too():
     assert off_px(pitch, camera, answer.candidates[0].camera) < 0.5
 
 
+@pytest.mark.long
 def test_lens_and_pose_are_found_together():
     pitch, camera, answer = found("football", "SIDELINE", lens_is_known=False)
     assert answer.refusal is None, answer.refusal
@@ -84,6 +87,7 @@ def test_lens_and_pose_are_found_together():
     assert abs(off) < max(4 * best.intrinsics.sigma["fx"], 6.0)
 
 
+@pytest.mark.long
 def test_a_lens_that_bends_much_more_than_usual_ones_is_found_with_the_pose():
     barrel = camera("one", (-6.0, -52.0, 16.0), (-10.0, 0.0), distortion=(-0.25, 0.06, 0.0, 0.0))
     size, frame = barrel.intrinsics.size, paint_frame(PITCH, barrel)
@@ -93,6 +97,7 @@ def test_a_lens_that_bends_much_more_than_usual_ones_is_found_with_the_pose():
     assert off_px(PITCH, barrel, answer.candidates[0].camera) < 1.0
 
 
+@pytest.mark.long
 def test_other_lenses_are_looked_through_where_the_first_find_nothing():
     # A lens of half the focal length explains no line of the frame.
     frame, lens = paint_frame(PITCH, SIDELINE), SIDELINE.intrinsics
@@ -107,11 +112,13 @@ def test_other_lenses_are_looked_through_where_the_first_find_nothing():
     assert answers[1].refusal is None
 
 
+@pytest.mark.long
 def test_a_camera_stands_where_it_may():
     _, _, answer = found("football", "SIDELINE", lens_is_known=True, place=Place("far"))
     assert answer.candidates[0].camera.pose.position[1] > 0
 
 
+@pytest.mark.long
 def test_three_lines_do_not_tell_a_lens_and_are_refused_with_the_pixels_that_it_leaves_open():
     # One line along padel's service boxes, and what of the lines across it is seen between two markings.
     court = field("padel")
@@ -129,6 +136,7 @@ def test_a_lens_that_bends_the_picture_back_before_its_corners_does_not_see_all_
     assert sees_all_of_its_frame(SIDELINE.intrinsics)
 
 
+@pytest.mark.long
 def test_a_yard_line_too_far_is_left_for_the_true_one():
     pitch = field("american-football")
     truth = camera("one", (15.0, -44.0, 22.0), (35.0, -10.0), focal=900.0)
@@ -141,6 +149,7 @@ def test_a_frame_without_lines_finds_nothing_and_says_so():
     assert answer.refusal.reason in ("no-lines", "lines", "few-lines")
 
 
+@pytest.mark.long
 def test_two_parallel_lines_are_no_field():
     frame = GREEN.copy()
     frame[200:204] = frame[300:304] = 240

@@ -1,6 +1,7 @@
 """Cameras of which several poses explain the lines, and others that see the same ground."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from worker.calibration.relocalisation.sought import ANYWHERE, Place, SoughtCame
 
 LEFT, RIGHT = pair()
 FAR_RIGHT = camera("far right", (8.0, -48.0, 10.0), (55.0, -12.0))
+CAMERAS = (LEFT, RIGHT, FAR_RIGHT)
 NOT_UNIQUE = NotFound("not-unique", "two poses explain the lines")
 
 
@@ -39,15 +41,18 @@ def open_between(*poses):
     return Relocalisation([candidate(one) for one in poses], NOT_UNIQUE)
 
 
+@cache
+def ground():
+    return SharedGround.of(PITCH, {one.id: worn(PITCH, one, paint_frame(PITCH, one)) for one in CAMERAS})
+
+
 def told(found, places=None, known=()):
-    cameras = (LEFT, RIGHT, FAR_RIGHT)
-    frames = {one.id: worn(PITCH, one, paint_frame(PITCH, one)) for one in cameras}
     places = places or {}
     sought = {
         one.id: SoughtCamera(one.id, [SoughtLens.known(one.intrinsics)], places.get(one.id, ANYWHERE))
-        for one in cameras
+        for one in CAMERAS
     }
-    return tell_rivals_apart(PITCH, FieldMap.of(PITCH), found, sought, known, SharedGround.of(PITCH, frames))
+    return tell_rivals_apart(PITCH, FieldMap.of(PITCH), found, sought, known, ground())
 
 
 @pytest.mark.parametrize("poses", [(LEFT, slid(LEFT)), (slid(LEFT), LEFT), (slid(LEFT), twin(LEFT))])

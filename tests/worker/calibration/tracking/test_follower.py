@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
+from testbed.parameters import try_first
 from testbed.synthetic import CROWNED, moved, pair, pair_frames
 from worker.calibration.detection.contrast import Channels
 from worker.calibration.detection.frame_fusion import Sway
@@ -81,7 +82,7 @@ def sigma_deg(moment: TrackedMoment) -> float:
     return moment.cameras[0].motion_sigma.rotation_deg
 
 
-@pytest.mark.parametrize(("every", "look_ahead"), [(1, 0), (1, 10), (2, 10)])
+@pytest.mark.parametrize(("every", "look_ahead"), try_first([(2, 10), (1, 0), (1, 10)]))
 def test_a_shaking_camera_is_followed_to_a_fraction_of_a_pixel_and_every_frame_is_told_once(every, look_ahead):
     moments = followed_as_it_is(every, look_ahead)
     assert [moment.number for moment in moments] == list(range(COUNT))
@@ -138,6 +139,7 @@ def test_where_a_frame_is_missing_in_which_lines_were_due_they_are_measured_in_t
     assert how(moments)[:8] == ["measured", "coasted", "coasted", "measured", *2 * ["coasted", "measured"]]
 
 
+@pytest.mark.long
 def test_who_looks_ahead_bridges_a_short_gap():
     gap = dict.fromkeys(range(12, 16))
     blind, ahead = followed(gap), followed(gap, look_ahead=8)
@@ -170,7 +172,7 @@ def magnified(picture: np.ndarray, by: float) -> np.ndarray:
     return cv2.warpAffine(picture, matrix, LEFT.intrinsics.size, flags=cv2.INTER_CUBIC, borderMode=cv2.BORDER_REFLECT)
 
 
-@pytest.mark.parametrize("by", [1.02, 1.01])
+@pytest.mark.parametrize("by", try_first([1.02, 1.01]))
 def test_a_lens_that_is_zoomed_is_refused_however_long_it_is_looked_at(by):
     """A pose that nobody knows any more must not be drawn to where a part of the lines fits it."""
     moments = followed({number: magnified(frame(number), by) for number in range(12, COUNT)})
