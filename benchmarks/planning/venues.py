@@ -27,8 +27,8 @@ from worker.calibration.geometry.parameters import (
 )
 from worker.calibration.planning.line_state import STATES, StateName
 
-VENUES = 36
-SIZE = (1920, 1080)
+VENUES = 30
+SIZE = (1600, 900)
 SPORTS = ("football", "football", "rugby-union", "hockey", "football", "american-football")
 # Swell of the renderer's ground that is as uneven as the engine takes turf to be: its own is 23 mm.
 SWELL = TURF_M / 0.0233
@@ -70,10 +70,13 @@ class BuiltVenue:
         rng = np.random.default_rng([43, self.number])
         return [one.with_pose(outdated(one.pose, START_M, START_DEG, rng)) for one in self.cameras]
 
+    def there(self, xy: Array) -> Array:
+        """Return the places (..., 2) on the real field that correspond to those of the planned one, m."""
+        return xy * np.array([self.real_pitch.length, self.real_pitch.width]) / [self.pitch.length, self.pitch.width]
+
     def ground(self, xy: Array) -> Array:
         """Return the true places (H, W, 3) of points (H, W, 2) of the planned field, neighbours on a grid."""
-        size = np.array([self.real_pitch.length, self.real_pitch.width])
-        there = xy * size / [self.pitch.length, self.pitch.width]
+        there = self.there(xy)
         x, y = np.moveaxis(there.astype(np.float32), -1, 0)
         swell = build_world(self.real_pitch, self.conditions).bumps.at(Patch(x, y, x, np.ones(x.shape, dtype=bool)))
         return self.real_pitch.lift(there) + swell[..., None] * [0.0, 0.0, 1.0]
@@ -131,7 +134,7 @@ def _field(sport: str) -> Field:
 
 
 def _cameras(pitch: Field, rng: np.random.Generator) -> list[Camera]:
-    count = int(rng.integers(1, 4))
+    count = int(rng.choice([1, 2, 3], p=[0.5, 0.35, 0.15]))
     height, away = rng.uniform(6, 18), rng.uniform(5, 22)
     wide = rng.uniform(55, 80)
     apart = rng.choice([1.0, 1.0, 12.0])

@@ -57,7 +57,7 @@ class PlanSolution:
 def solve(site: PlannedSite, state: LineStateName, hidden: float) -> PlanSolution:
     """Plan the cameras of a site, for lines in a `state` of which players and others hide a share `hidden` 0..1."""
     pitch = pitch_of(site.field)
-    planned = plan(pitch, [_camera(pitch, camera) for camera in site.cameras], STATES[state], hidden)
+    planned = plan(pitch, [camera_of(pitch, camera) for camera in site.cameras], STATES[state], hidden)
     warnings = find_warnings(planned)
     decisive = decisive_markings(planned)
     result = PlanResult(
@@ -72,7 +72,8 @@ def solve(site: PlannedSite, state: LineStateName, hidden: float) -> PlanSolutio
     return PlanSolution(result, _maps(planned), _pictures(planned))
 
 
-def _camera(pitch: Field, given: PlannedCameraIn) -> Camera:
+def camera_of(pitch: Field, given: PlannedCameraIn) -> Camera:
+    """Return the engine's camera of one that is to be mounted."""
     ignored = ignored_areas_of(given.ignore, given.image_size)
     return Camera(given.id, _lens(given), _pose(pitch, given), ignored)
 
@@ -98,12 +99,12 @@ def _pose(pitch: Field, given: PlannedCameraIn) -> Pose:
         return Pose(np.array(stored.rotation), np.array(stored.position))
     position = np.array(given.position, dtype=float)
     if given.look_at is not None:
-        return Pose.looking_at(position, pitch.lift(np.array(given.look_at)), given.roll_deg)
+        return Pose.looking_at(position, pitch.lift(np.array(given.look_at)), -given.roll_deg)
     assert given.pan_deg is not None
     assert given.tilt_deg is not None
     pan, tilt = np.radians([given.pan_deg, given.tilt_deg])
     ahead = np.array([np.sin(pan) * np.cos(tilt), np.cos(pan) * np.cos(tilt), np.sin(tilt)])
-    return Pose.looking_at(position, position + ahead, given.roll_deg)
+    return Pose.looking_at(position, position + ahead, -given.roll_deg)
 
 
 def _covered(planned: Plan) -> dict[int, float]:

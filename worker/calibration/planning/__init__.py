@@ -1,1 +1,1 @@
-"""Plans: what cameras would see of a field, and how exactly they could be calibrated, before they are mounted."""
+"""Plans of cameras that are not mounted yet: what they would see of a field, and how exactly a calibration would be."""

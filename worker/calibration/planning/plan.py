@@ -21,7 +21,7 @@ from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.visibility import VisibleLines
 from worker.calibration.planning.ground_errors import ground_error_jacobian, sigmas
 from worker.calibration.planning.line_state import LineState, expect_measurements
-from worker.calibration.refinement.expected_errors import expect_errors
+from worker.calibration.refinement.expected_errors import ErrorModel
 from worker.calibration.refinement.uncertainty import GroundSigma, Sigma
 
 Mask = NDArray[np.bool_]
@@ -112,17 +112,9 @@ class Plan:
         return np.sum([one.seen for one in self.cameras], axis=0)
 
 
-def plan(
-    pitch: Field, cameras: Sequence[Camera], state: LineState, hidden: float = 0.0, without: Sequence[int] = ()
-) -> Plan:
-    """Return the plan of cameras at their poses, `hidden` a share of all lines that something covers.
-
-    `without`: numbers of markings that are taken not to be painted.
-    """
-    planner = _Planner(pitch, cameras, state, hidden, without)
-    pairs = [planner.pair(*pair) for pair in combinations(range(len(cameras)), 2) if planner.both_see(*pair).any()]
-    each = [planner.camera(number) for number in range(len(cameras))]
-    return Plan(pitch, state, hidden, planner.xy, each, pairs)
+def plan(pitch: Field, cameras: Sequence[Camera], state: LineState, hidden: float = 0.0) -> Plan:
+    """Return the plan of cameras at their poses, `hidden` a share of all lines that something covers."""
+    return Planner(pitch, cameras, state, hidden).plan()
 
 
 def field_cells(pitch: Field) -> Array:
@@ -133,19 +125,37 @@ def field_cells(pitch: Field) -> Array:
     return np.stack(np.meshgrid(x, y), axis=-1)
 
 
-class _Planner:
+class Planner:
     """Expected measurements and errors of all cameras, and the ground that each of them sees."""
 
-    def __init__(
-        self, pitch: Field, cameras: Sequence[Camera], state: LineState, hidden: float, without: Sequence[int]
-    ) -> None:
-        self._pitch, self._cameras, self._lines = pitch, cameras, pitch.line_points()
-        self.xy = field_cells(pitch)
-        self._ground = pitch.lift(self.xy)
-        expected = [expect_measurements(self._lines, camera, state, hidden) for camera in cameras]
-        self._measured = [its[~np.isin(its.points.marking, without)] for its in expected]
-        self._errors = expect_errors(pitch, cameras, self._measured)
+    def __init__(self, pitch: Field, cameras: Sequence[Camera], state: LineState, hidden: float) -> None:
+        self._pitch, self._cameras, self._state, self._hidden = pitch, cameras, state, hidden
+        self._lines, self._xy = pitch.line_points(), field_cells(pitch)
+        self._ground = pitch.lift(self._xy)
+        self._measured = [expect_measurements(self._lines, camera, state, hidden) for camera in cameras]
+        self._model = ErrorModel(pitch, cameras)
+        self._errors = self._model.expect(self._measured)
         self._seen = [camera.sees(camera.project(self._ground)) for camera in cameras]
+        self._jacobians = [self._jacobian(number, self._ground[seen]) for number, seen in enumerate(self._seen)]
+
+    def plan(self) -> Plan:
+        """Return the plan of all cameras and pairs."""
+        pairs = list(combinations(range(len(self._cameras)), 2))
+        return Plan(
+            self._pitch,
+            self._state,
+            self._hidden,
+            self._xy,
+            [self.camera(number) for number in range(len(self._cameras))],
+            [self.pair(*pair) for pair in pairs if self.both_see(*pair).any()],
+        )
+
+    def calibrated_without(self, markings: Sequence[int]) -> list[Array]:
+        """Return `CameraPlan.calibrated_m` (H, W) of each camera if some markings were not painted."""
+        measured = [its[~np.isin(its.points.marking, markings)] for its in self._measured]
+        covariance = self._model.expect(measured).as_given
+        parts = zip(self._seen, self._jacobians, strict=True)
+        return [_on_map(seen, sigmas(jacobian, covariance, 0.0)) for seen, jacobian in parts]
 
     def both_see(self, first: int, second: int) -> Mask:
         """Return True (H, W) where both cameras see the ground."""
@@ -154,7 +164,7 @@ class _Planner:
     def camera(self, number: int) -> CameraPlan:
         """Return the plan of one camera."""
         camera, errors, seen = self._cameras[number], self._errors, self._seen[number]
-        jacobian = self._jacobian(number, seen)
+        jacobian = self._jacobians[number]
         uneven_m = self._pitch.template.uneven
         poses = np.zeros_like(errors.as_given)
         poses[: len(errors.by_measurement), : len(errors.by_measurement)] = errors.by_measurement
@@ -177,11 +187,11 @@ class _Planner:
     def pair(self, first: int, second: int) -> PairPlan:
         """Return the plan of two cameras that see some of the same ground."""
         seen = self.both_see(first, second)
-        apart = self._jacobian(first, seen) - self._jacobian(second, seen)
-        stitch_m = sigmas(apart, self._errors.as_given, self._pitch.template.uneven)
+        here, there = (self._jacobians[number][seen[self._seen[number]]] for number in (first, second))
+        stitch_m = sigmas(here - there, self._errors.as_given, self._pitch.template.uneven)
         one, other = self._measured[first], self._measured[second]
-        index, here, there = np.intersect1d(one.index, other.index, return_indices=True)
-        common = self._metres(index, np.minimum(one.trust[here], other.trust[there]))
+        index, at, also_at = np.intersect1d(one.index, other.index, return_indices=True)
+        common = self._metres(index, np.minimum(one.trust[at], other.trust[also_at]))
         names = self._cameras[first].id, self._cameras[second].id
         return PairPlan(*names, seen, float(np.sqrt(np.mean(stitch_m**2))), common)
 
@@ -191,15 +201,14 @@ class _Planner:
         if len(points) == 0:
             return None
         points = points[:: max(len(points) // 200, 1)]
-        on_ground = ground_error_jacobian(self._pitch, camera, number, points, self._errors.unknowns)
+        on_ground = self._jacobian(number, points)
         in_picture = pixel_jacobian(camera, points)[..., 3:5] @ on_ground
         metres, pixels = (sigmas(one, self._errors.refined, 0.0) for one in (on_ground, in_picture))
         return GroundSigma(metres, pixels)
 
-    def _jacobian(self, number: int, seen: Mask) -> Array:
-        return ground_error_jacobian(
-            self._pitch, self._cameras[number], number, self._ground[seen], self._errors.unknowns
-        )
+    def _jacobian(self, number: int, points: Array) -> Array:
+        """Jacobian (N, 2, D + 1) of where a camera puts points (N, 3), see `ground_error_jacobian`."""
+        return ground_error_jacobian(self._pitch, self._cameras[number], number, points, self._model.unknowns)
 
     def _metres(self, index: NDArray[np.intp], trust: Array) -> Array:
         """Return the length (K,) of each marking that measurements (M,) stand for, m."""

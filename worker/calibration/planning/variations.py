@@ -9,7 +9,7 @@ import numpy as np
 
 from worker.calibration.geometry.camera import Array, Camera, Pose
 from worker.calibration.geometry.rotation import rotation_matrices, rotation_vectors
-from worker.calibration.planning.plan import PairPlan, Plan, plan
+from worker.calibration.planning.plan import PairPlan, Plan, Planner, plan
 
 HIGHER_M = 1.0
 OVERLAP_DEG = 5.0
@@ -40,16 +40,16 @@ class DecisiveMarking:
 def decisive_markings(planned: Plan) -> list[list[DecisiveMarking]]:
     """Return for each camera the markings that it measures, the one that it can least do without first."""
     found: list[list[DecisiveMarking]] = [[] for _ in planned.cameras]
+    planner = Planner(planned.pitch, [one.camera for one in planned.cameras], planned.state, planned.hidden)
     names = planned.pitch.whole_names()
     line_m = np.sum([one.line_m for one in planned.cameras], axis=0)
     for name in dict.fromkeys(names):
         its = [number for number, whole in enumerate(names) if whole == name]
         if line_m[its].sum() == 0:
             continue
-        without = _planned_again(planned, [one.camera for one in planned.cameras], its)
-        for markings, before, after in zip(found, planned.cameras, without.cameras, strict=True):
+        for markings, before, after in zip(found, planned.cameras, planner.calibrated_without(its), strict=True):
             if before.line_m[its].sum() > 0:
-                markings.append(DecisiveMarking(name, _change(before.calibrated_m, after.calibrated_m)))
+                markings.append(DecisiveMarking(name, _change(before.calibrated_m, after)))
     return [sorted(markings, key=lambda one: -one.without.factor) for markings in found]
 
 
@@ -96,8 +96,8 @@ def panned(camera: Camera, to_the_left_deg: float) -> Camera:
     return camera.with_pose(Pose(rotation_vectors(camera.pose.matrix @ turn), camera.pose.position))
 
 
-def _planned_again(planned: Plan, cameras: Sequence[Camera], without: Sequence[int] = ()) -> Plan:
-    return plan(planned.pitch, cameras, planned.state, planned.hidden, without)
+def _planned_again(planned: Plan, cameras: Sequence[Camera]) -> Plan:
+    return plan(planned.pitch, cameras, planned.state, planned.hidden)
 
 
 def _change(before: Array, after: Array) -> Change:

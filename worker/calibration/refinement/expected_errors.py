@@ -67,14 +67,19 @@ class ExpectedErrors:
         return Sigma.from_covariance(covariance[own, own])
 
 
-def expect_errors(pitch: Field, cameras: Sequence[Camera], measured: Sequence[Measurements]) -> ExpectedErrors:
-    """Return the errors expected of a calibration of cameras by lines `measured` where their poses put them."""
-    solved = Unknowns(len(cameras), (), Ground.under(pitch.line_points()))
-    estimate = Estimate.initial(pitch, cameras, solved)
-    unknowns = unknowns_of(estimate, [None] * len(cameras), solved)
-    return ExpectedErrors(
-        unknowns,
-        expected_information(estimate, measured, unknowns),
-        estimate.weak_prior(),
-        np.array([parameter.expected**2 for parameter in unknowns.parameters]),
-    )
+class ErrorModel:
+    """All that may be wrong with cameras at their poses, their lenses and their field."""
+
+    def __init__(self, pitch: Field, cameras: Sequence[Camera]) -> None:
+        solved = Unknowns(len(cameras), (), Ground.under(pitch.line_points()))
+        self._estimate = Estimate.initial(pitch, cameras, solved)
+        self.unknowns = unknowns_of(self._estimate, [None] * len(cameras), solved)
+
+    def expect(self, measured: Sequence[Measurements]) -> ExpectedErrors:
+        """Return the errors expected of a calibration by lines `measured` where the poses of the cameras put them."""
+        return ExpectedErrors(
+            self.unknowns,
+            expected_information(self._estimate, measured, self.unknowns),
+            self._estimate.weak_prior(),
+            np.array([parameter.expected**2 for parameter in self.unknowns.parameters]),
+        )
