@@ -26,7 +26,13 @@ def plan(
         ),
     ],
     output: Annotated[
-        Path, typer.Option("-o", "--output", file_okay=False, help="Folder for plan.json, maps.json and the maps.")
+        Path,
+        typer.Option(
+            "-o",
+            "--output",
+            file_okay=False,
+            help="Folder for plan.json, the maps, and find.json for `esc find` once the cameras are mounted.",
+        ),
     ],
     lines: Annotated[
         LineStateName, typer.Option("--lines", help="State of the lines: freshly painted, worn, or under floodlight.")
@@ -51,6 +57,8 @@ def plan(
         (output / name).write_bytes(picture)
     (output / "plan.json").write_text(solution.result.model_dump_json(indent=2) + "\n")
     (output / "maps.json").write_text(solution.maps.model_dump_json() + "\n")
+    sought = place.to_sought(solution.result)
+    (output / "find.json").write_text(sought.model_dump_json(indent=2, exclude_none=True) + "\n")
     if as_json or not sys.stdout.isatty():
         print_json(solution.result)
     else:

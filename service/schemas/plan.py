@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, StringConstraints, model_validator
 
 from service.schemas.addresses import SourceUrl
-from service.schemas.base import Id, Number, Schema
+from service.schemas.base import Id, Integer, Number, Schema
 from service.schemas.field import PitchPoint
+from service.schemas.find import SoughtCameraIn, SoughtSite
 from service.schemas.geometry import Intrinsics, Light, PoseIn, Position, Side, check_lens, require_camera_id
 from service.schemas.results import Sigma
 from service.schemas.venue import Ignore, VenueSettings, require_distinct_ids
@@ -78,17 +79,65 @@ class PlannedCameraIn(Schema):
         return self
 
 
+class StandIn(Schema):
+    """A place for several cameras, whose directions and lens are to be proposed."""
+
+    id: Annotated[str, StringConstraints(pattern=r"^[a-z0-9][a-z0-9_-]{0,60}$")] = Field(
+        description="Its cameras are called `id-1`, `id-2` and so on, from left to right."
+    )
+    position: Position
+    cameras: Annotated[Integer, Field(ge=1, le=8)]
+    image_size: Annotated[list[Side], Field(min_length=2, max_length=2)] = Field(description="Width, height in pixels.")
+    overlap_deg: Annotated[Number, Field(ge=0, le=30)] = 5.0
+
+    @model_validator(mode="after")
+    def _above_the_pitch(self) -> Self:
+        if self.position[2] <= 0:
+            raise ValueError(
+                f"stand {self.id} is at z = {self.position[2]:.6g} m: z points up, it must be above the pitch"
+            )
+        return self
+
+
 class PlannedSite(VenueSettings):
     """A field and the cameras that are to be mounted around it; a whole venue is one, too."""
 
     id: Id = "plan"
-    cameras: Annotated[list[PlannedCameraIn], Field(min_length=1, max_length=32)]
+    cameras: Annotated[list[PlannedCameraIn], Field(max_length=32)] = Field([])
+    stands: Annotated[list[StandIn], Field(max_length=8)] = Field([])
     warnings: list[str] = Field([], exclude=True, description="Ignored: a venue is a valid plan.")
 
     @model_validator(mode="after")
     def _cameras_differ(self) -> Self:
-        require_distinct_ids([camera.id for camera in self.cameras])
+        proposed = [f"{stand.id}-{number}" for stand in self.stands for number in range(1, stand.cameras + 1)]
+        require_distinct_ids([*(camera.id for camera in self.cameras), *proposed])
+        if not self.cameras and not self.stands:
+            raise ValueError("a plan needs cameras, or stands to propose cameras for")
         return self
+
+    def to_sought(self, planned: PlanResult) -> SoughtSite:
+        """Return the site for a search once the cameras are mounted: what is planned of each, and what is known."""
+        known = {camera.id: camera for camera in self.cameras}
+        return SoughtSite(
+            id=self.id,
+            name=self.name,
+            field=self.field,
+            cameras=[_sought(one, known.get(one.id)) for one in planned.cameras],
+        )
+
+
+def _sought(planned: PlannedCameraResult, given: PlannedCameraIn | None) -> SoughtCameraIn:
+    lens = None if given is None else given.intrinsics
+    return SoughtCameraIn(
+        id=planned.id,
+        image_size=planned.image_size,
+        intrinsics=lens,
+        field_of_view_deg=None if lens is not None else max(planned.field_of_view_deg, 5.0),
+        position=planned.position,
+        # A mast that is put up beside its place.
+        position_radius_m=3.0,
+        ignore=[] if given is None else given.ignore,
+    )
 
 
 class Spread(Schema):
@@ -117,6 +166,11 @@ class PlannedCameraResult(Schema):
     """Plan of a camera."""
 
     id: Id
+    image_size: list[int]
+    position: list[float] = Field(description="Place, m.")
+    pan_deg: float
+    tilt_deg: float
+    field_of_view_deg: float = Field(description="Horizontal field of view.")
     calibratable: bool = Field(description="False if the quality gate would refuse its poses.")
     share_of_field: float = Field(description="Share of the field in view, 0..1.")
     sigma: Sigma = Field(description="Expected sigma of its pose, for the lens as given.")
@@ -156,7 +210,7 @@ class PlanWarningResult(Schema):
 
 
 class PlanResult(Schema):
-    """What a calibration of the planned cameras would be like."""
+    """Expected calibration of planned cameras: sigmas, coverage, overlap, what decides them, and warnings."""
 
     lines: LineStateName
     hidden: float

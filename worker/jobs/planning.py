@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import atan, degrees
 
 import numpy as np
 
@@ -22,13 +23,22 @@ from service.schemas.plan import (
     PlanWarningResult,
     Rows,
     Spread,
+    StandIn,
 )
 from service.schemas.results import Sigma as SigmaSchema
 from worker.calibration.geometry.camera import Array, Camera, Pose
 from worker.calibration.geometry.field import Field
-from worker.calibration.geometry.lens import Intrinsics, Lens
+from worker.calibration.geometry.lens import Lens
 from worker.calibration.planning.line_state import STATES
 from worker.calibration.planning.plan import CameraPlan, PairPlan, Plan, plan
+from worker.calibration.planning.stand import (
+    Stand,
+    field_of_view_deg,
+    pan_tilt_deg,
+    pinhole,
+    pose_by_angles,
+    propose_cameras,
+)
 from worker.calibration.planning.variations import (
     Change,
     DecisiveMarking,
@@ -57,7 +67,7 @@ class PlanSolution:
 def solve(site: PlannedSite, state: LineStateName, hidden: float) -> PlanSolution:
     """Plan the cameras of a site, for lines in a `state` of which players and others hide a share `hidden` 0..1."""
     pitch = pitch_of(site.field)
-    planned = plan(pitch, [camera_of(pitch, camera) for camera in site.cameras], STATES[state], hidden)
+    planned = plan(pitch, _cameras(pitch, site), STATES[state], hidden)
     warnings = find_warnings(planned)
     decisive = decisive_markings(planned)
     result = PlanResult(
@@ -72,6 +82,17 @@ def solve(site: PlannedSite, state: LineStateName, hidden: float) -> PlanSolutio
     return PlanSolution(result, _maps(planned), _pictures(planned))
 
 
+def _cameras(pitch: Field, site: PlannedSite) -> list[Camera]:
+    """Return the engine's cameras of a site: those that are given, and those proposed for its stands."""
+    proposed = [camera for one in site.stands for camera in propose_cameras(pitch, _stand(one))]
+    return [*(camera_of(pitch, camera) for camera in site.cameras), *proposed]
+
+
+def _stand(given: StandIn) -> Stand:
+    width, height = given.image_size
+    return Stand(given.id, np.array(given.position, dtype=float), given.cameras, (width, height), given.overlap_deg)
+
+
 def camera_of(pitch: Field, given: PlannedCameraIn) -> Camera:
     """Return the engine's camera of one that is to be mounted."""
     ignored = ignored_areas_of(given.ignore, given.image_size)
@@ -79,18 +100,15 @@ def camera_of(pitch: Field, given: PlannedCameraIn) -> Camera:
 
 
 def _lens(given: PlannedCameraIn) -> Lens:
-    """Return the lens of a camera; one that nobody has calibrated yet without distortion, its axis in the middle."""
+    """Return the lens of a camera; one that nobody has calibrated yet without distortion."""
     if given.intrinsics is not None:
         return lens_of(given.intrinsics, given.image_size)
     width, height = given.image_size
     if given.field_of_view_deg is not None:
-        focal = width / 2 / np.tan(np.radians(given.field_of_view_deg) / 2)
-    else:
-        assert given.focal_length_mm is not None
-        assert given.sensor_width_mm is not None
-        focal = given.focal_length_mm / given.sensor_width_mm * width
-    matrix = np.array([[focal, 0.0, (width - 1) / 2], [0.0, focal, (height - 1) / 2], [0.0, 0.0, 1.0]])
-    return Intrinsics(matrix, np.zeros(5), (width, height))
+        return pinhole((width, height), given.field_of_view_deg)
+    assert given.focal_length_mm is not None
+    assert given.sensor_width_mm is not None
+    return pinhole((width, height), 2 * degrees(atan(given.sensor_width_mm / 2 / given.focal_length_mm)))
 
 
 def _pose(pitch: Field, given: PlannedCameraIn) -> Pose:
@@ -102,9 +120,7 @@ def _pose(pitch: Field, given: PlannedCameraIn) -> Pose:
         return Pose.looking_at(position, pitch.lift(np.array(given.look_at)), -given.roll_deg)
     assert given.pan_deg is not None
     assert given.tilt_deg is not None
-    pan, tilt = np.radians([given.pan_deg, given.tilt_deg])
-    ahead = np.array([np.sin(pan) * np.cos(tilt), np.cos(pan) * np.cos(tilt), np.sin(tilt)])
-    return Pose.looking_at(position, position + ahead, -given.roll_deg)
+    return pose_by_angles(position, given.pan_deg, given.tilt_deg, given.roll_deg)
 
 
 def _covered(planned: Plan) -> dict[int, float]:
@@ -117,8 +133,14 @@ def _camera_result(
 ) -> PlannedCameraResult:
     one = planned.cameras[number]
     refused = any(one.camera.id in warning.cameras and warning.kind in REFUSED for warning in warnings)
+    pan_deg, tilt_deg = pan_tilt_deg(one.camera.pose)
     return PlannedCameraResult(
         id=one.camera.id,
+        position=one.camera.pose.position.round(3).tolist(),
+        pan_deg=round(pan_deg, 2),
+        tilt_deg=round(tilt_deg, 2),
+        field_of_view_deg=round(field_of_view_deg(one.camera), 2),
+        image_size=list(one.camera.intrinsics.size),
         calibratable=not refused,
         share_of_field=round(one.share, 4),
         sigma=_sigma(one.sigma),

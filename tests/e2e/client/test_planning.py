@@ -25,6 +25,8 @@ def test_a_plan_is_a_document_maps_in_numbers_and_pictures(tmp_path):
     assert answer["lines"] == "worn"
     maps = json.loads((tmp_path / "out" / "maps.json").read_text())
     assert [len(row) for row in maps["place_m"]] == [len(maps["x_m"])] * len(maps["y_m"])
+    sought = json.loads((tmp_path / "out" / "find.json").read_text())
+    assert [camera["id"] for camera in sought["cameras"]] == ["left", "right"]
     pictures = {path.name: cv2.imread(str(path)) for path in (tmp_path / "out").glob("*.png")}
     assert {"place.png", "place-left.png", "coverage.png", "pixels-per-metre.png"} <= set(pictures)
     assert all(picture.shape[1] == 1600 for picture in pictures.values())

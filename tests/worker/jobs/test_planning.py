@@ -5,6 +5,7 @@ import pytest
 from pydantic import ValidationError
 
 from service.formats.opentrackio import AHEAD_IS_Y, pan_tilt_roll
+from service.schemas.find import SoughtSite
 from service.schemas.plan import PlannedSite
 from testbed.synthetic import PITCH, pair
 from testbed.venue_documents import venue_document
@@ -69,3 +70,19 @@ def test_a_whole_venue_is_planned_at_its_stored_poses():
     assert sum(found.result.covered.values()) == pytest.approx(1.0, abs=1e-3)
     assert len(found.maps.place_m) == len(found.maps.y_m)
     assert {"place.png", "coverage.png", "pixels-per-metre.png", "place-left.png"} <= set(found.pictures)
+
+
+def test_a_stand_gets_cameras_and_the_plan_is_a_site_to_search_for_them():
+    stand = {"id": "mast", "position": [0.0, -49.0, 12.0], "cameras": 2, "image_size": [1920, 1080]}
+    place = PlannedSite.model_validate({"field": {"template": "football"}, "stands": [stand]})
+    found = planning.solve(place, "fresh", 0.0).result
+    assert [camera.id for camera in found.cameras] == ["mast-1", "mast-2"]
+    assert found.cameras[0].pan_deg < 0 < found.cameras[1].pan_deg
+    sought = SoughtSite.model_validate_json(place.to_sought(found).model_dump_json(exclude_none=True))
+    assert sought.sought == ["mast-1", "mast-2"]
+    assert sought.cameras[0].field_of_view_deg == found.cameras[0].field_of_view_deg
+
+
+def test_a_plan_of_nothing_is_refused():
+    with pytest.raises(ValidationError, match="needs cameras, or stands"):
+        PlannedSite.model_validate({"field": {"template": "football"}})

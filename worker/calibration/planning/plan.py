@@ -25,8 +25,6 @@ from worker.calibration.refinement.expected_errors import ErrorModel
 from worker.calibration.refinement.uncertainty import GroundSigma, Sigma
 
 Mask = NDArray[np.bool_]
-COLUMNS = 50
-"""Number of cells of a map along the field."""
 
 
 @dataclass(frozen=True)
@@ -119,8 +117,9 @@ def plan(pitch: Field, cameras: Sequence[Camera], state: LineState, hidden: floa
 
 def field_cells(pitch: Field) -> Array:
     """Return the centres (H, W, 2) of about square cells of a field, m, row by row from the far touchline."""
-    rows = max(round(COLUMNS * pitch.width / pitch.length), 1)
-    x = ((np.arange(COLUMNS) + 0.5) / COLUMNS - 0.5) * pitch.length
+    columns = 50
+    rows = max(round(columns * pitch.width / pitch.length), 1)
+    x = ((np.arange(columns) + 0.5) / columns - 0.5) * pitch.length
     y = (0.5 - (np.arange(rows) + 0.5) / rows) * pitch.width
     return np.stack(np.meshgrid(x, y), axis=-1)
 

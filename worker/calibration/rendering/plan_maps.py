@@ -14,14 +14,9 @@ from worker.calibration.rendering.overlays import draw_line, outline
 
 Colour = tuple[int, int, int]
 WIDTH_PX = 1600
-MARGIN_PX, TEXT_PX, ROW_PX = 60, 26, 34
-PAPER: Colour = (255, 255, 255)
+MARGIN_PX, TEXT_PX = 60, 26
 GROUND: Colour = (228, 228, 228)
 INK: Colour = (40, 40, 40)
-CAMERA: Colour = (0, 0, 0)
-FARTHEST_M = 60.0
-"""Distance beside the field up to which a camera is drawn where it stands; one farther away is drawn there."""
-
 # Six steps from best to worst, in the order of ColorBrewer's RdYlBu, which stays apart for the colour-blind. BGR.
 STEPS: Sequence[Colour] = (
     (180, 117, 69),
@@ -68,8 +63,8 @@ def plan_map(pitch: Field, values: Array, cameras: Sequence[Camera], scale: Scal
 
     Rows begin at the far touchline.
     """
-    sheet = _Sheet(pitch, cameras)
-    picture = np.full((sheet.height_px + (len(scale.names) + 3) * ROW_PX, WIDTH_PX, 3), PAPER, np.uint8)
+    sheet, row_px = _Sheet(pitch, cameras), TEXT_PX * 4 // 3
+    picture = np.full((sheet.height_px + (len(scale.names) + 3) * row_px, WIDTH_PX, 3), 255, np.uint8)
     corners = [np.array([side * pitch.length / 2, -side * pitch.width / 2]) for side in (-1, 1)]
     (left, top), (right, bottom) = (np.rint(sheet.pixel(corner)).astype(int).tolist() for corner in corners)
     picture[top:bottom, left:right] = _coloured(values, scale, (right - left, bottom - top))
@@ -80,7 +75,7 @@ def plan_map(pitch: Field, values: Array, cameras: Sequence[Camera], scale: Scal
     _write(picture, scale.title, (MARGIN_PX, TEXT_PX * 2), 1.2)
     entries = [*zip(scale.names, scale.colours, strict=True), ("not seen", GROUND)]
     for row, (name, colour) in enumerate(entries):
-        y = sheet.height_px + row * ROW_PX
+        y = sheet.height_px + row * row_px
         cv2.rectangle(picture, (MARGIN_PX, y), (MARGIN_PX + 2 * TEXT_PX, y + TEXT_PX), colour, cv2.FILLED)
         cv2.rectangle(picture, (MARGIN_PX, y), (MARGIN_PX + 2 * TEXT_PX, y + TEXT_PX), INK, 1)
         _write(picture, name, (MARGIN_PX + 3 * TEXT_PX, y + TEXT_PX - 5), 0.85)
@@ -98,11 +93,12 @@ def _coloured(values: Array, scale: Scale, size: tuple[int, int]) -> Frame:
 
 
 class _Sheet:
-    """Where places of the ground lie in the picture: the field, and the cameras around it."""
+    """Projection of the ground from above to the picture, with room for the cameras around the field."""
 
     def __init__(self, pitch: Field, cameras: Sequence[Camera]) -> None:
         half = np.array([pitch.length, pitch.width]) / 2
-        self._reach = half + FARTHEST_M
+        # A camera that stands farther from the field, m, is drawn at this distance.
+        self._reach = half + 60.0
         stands = np.clip([camera.pose.position[:2] for camera in cameras], -self._reach, self._reach)
         corners = np.concatenate([[-half, half], stands])
         self._low, self._high = corners.min(axis=0), corners.max(axis=0)
@@ -126,8 +122,8 @@ def _draw_camera(picture: Frame, sheet: _Sheet, camera: Camera) -> None:
     ahead = camera.pose.matrix[2, :2]
     aim = place + 6.0 * ahead / max(float(np.linalg.norm(ahead)), 1e-9)
     at, tip = (tuple(np.rint(sheet.pixel(point)).astype(int).tolist()) for point in (place, aim))
-    cv2.arrowedLine(picture, at, tip, CAMERA, 3, cv2.LINE_AA, tipLength=0.3)
-    cv2.circle(picture, at, 9, CAMERA, cv2.FILLED, cv2.LINE_AA)
+    cv2.arrowedLine(picture, at, tip, INK, 3, cv2.LINE_AA, tipLength=0.3)
+    cv2.circle(picture, at, 9, INK, cv2.FILLED, cv2.LINE_AA)
     # At the arrow's tip: cameras on one mast look different ways.
     (wide, high), _ = cv2.getTextSize(camera.id, cv2.FONT_HERSHEY_SIMPLEX, 0.85, 2)
     away = np.array(tip) - at
