@@ -104,6 +104,10 @@ class Plan:
         """Pixels (H, W) per metre in the camera that resolves a place best."""
         return np.fmax.reduce([one.px_per_metre for one in self.cameras])
 
+    def planner(self, cameras: Sequence[Camera]) -> Planner:
+        """Return a planner of other cameras on the same field, by the same lines."""
+        return Planner(self.pitch, cameras, self.state, self.hidden)
+
     @property
     def coverage(self) -> NDArray[np.intp]:
         """Number (H, W) of cameras that see each cell."""
@@ -135,7 +139,7 @@ class Planner:
         self._model = ErrorModel(pitch, cameras)
         self._errors = self._model.expect(self._measured)
         self._seen = [camera.sees(camera.project(self._ground)) for camera in cameras]
-        self._jacobians = [self._jacobian(number, self._ground[seen]) for number, seen in enumerate(self._seen)]
+        self._jacobians = dict[int, Array]()
 
     def plan(self) -> Plan:
         """Return the plan of all cameras and pairs."""
@@ -153,8 +157,9 @@ class Planner:
         """Return `CameraPlan.calibrated_m` (H, W) of each camera if some markings were not painted."""
         measured = [its[~np.isin(its.points.marking, markings)] for its in self._measured]
         covariance = self._model.expect(measured).as_given
-        parts = zip(self._seen, self._jacobians, strict=True)
-        return [_on_map(seen, sigmas(jacobian, covariance, 0.0)) for seen, jacobian in parts]
+        return [
+            _on_map(seen, sigmas(self._by_ground(number), covariance, 0.0)) for number, seen in enumerate(self._seen)
+        ]
 
     def both_see(self, first: int, second: int) -> Mask:
         """Return True (H, W) where both cameras see the ground."""
@@ -163,7 +168,7 @@ class Planner:
     def camera(self, number: int) -> CameraPlan:
         """Return the plan of one camera."""
         camera, errors, seen = self._cameras[number], self._errors, self._seen[number]
-        jacobian = self._jacobians[number]
+        jacobian = self._by_ground(number)
         uneven_m = self._pitch.template.uneven
         poses = np.zeros_like(errors.as_given)
         poses[: len(errors.by_measurement), : len(errors.by_measurement)] = errors.by_measurement
@@ -186,7 +191,7 @@ class Planner:
     def pair(self, first: int, second: int) -> PairPlan:
         """Return the plan of two cameras that see some of the same ground."""
         seen = self.both_see(first, second)
-        here, there = (self._jacobians[number][seen[self._seen[number]]] for number in (first, second))
+        here, there = (self._by_ground(number)[seen[self._seen[number]]] for number in (first, second))
         stitch_m = sigmas(here - there, self._errors.as_given, self._pitch.template.uneven)
         one, other = self._measured[first], self._measured[second]
         index, at, also_at = np.intersect1d(one.index, other.index, return_indices=True)
@@ -204,6 +209,12 @@ class Planner:
         in_picture = pixel_jacobian(camera, points)[..., 3:5] @ on_ground
         metres, pixels = (sigmas(one, self._errors.refined, 0.0) for one in (on_ground, in_picture))
         return GroundSigma(metres, pixels)
+
+    def _by_ground(self, number: int) -> Array:
+        """Jacobian (N, 2, D + 1) of where a camera puts the ground that it sees, computed once."""
+        if number not in self._jacobians:
+            self._jacobians[number] = self._jacobian(number, self._ground[self._seen[number]])
+        return self._jacobians[number]
 
     def _jacobian(self, number: int, points: Array) -> Array:
         """Jacobian (N, 2, D + 1) of where a camera puts points (N, 3), see `ground_error_jacobian`."""

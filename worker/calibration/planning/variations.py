@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from worker.calibration.geometry.camera import Array, Camera, Pose
 from worker.calibration.geometry.rotation import rotation_matrices, rotation_vectors
-from worker.calibration.planning.plan import PairPlan, Plan, Planner, plan
+from worker.calibration.planning.plan import PairPlan, Plan
 
 HIGHER_M = 1.0
 OVERLAP_DEG = 5.0
@@ -40,7 +39,7 @@ class DecisiveMarking:
 def decisive_markings(planned: Plan) -> list[list[DecisiveMarking]]:
     """Return for each camera the markings that it measures, the one that it can least do without first."""
     found: list[list[DecisiveMarking]] = [[] for _ in planned.cameras]
-    planner = Planner(planned.pitch, [one.camera for one in planned.cameras], planned.state, planned.hidden)
+    planner = planned.planner([one.camera for one in planned.cameras])
     names = planned.pitch.whole_names()
     line_m = np.sum([one.line_m for one in planned.cameras], axis=0)
     for name in dict.fromkeys(names):
@@ -57,8 +56,8 @@ def higher(planned: Plan, number: int) -> Change:
     """Return what `HIGHER_M` more of height would do to the places that a camera tells, aimed at the same ground."""
     cameras = [one.camera for one in planned.cameras]
     cameras[number] = raised(cameras[number], HIGHER_M)
-    after = _planned_again(planned, cameras)
-    return _change(planned.cameras[number].place_m, after.cameras[number].place_m)
+    after = planned.planner(cameras).camera(number)
+    return _change(planned.cameras[number].place_m, after.place_m)
 
 
 def with_more_overlap(planned: Plan, pair: PairPlan) -> PairPlan | None:
@@ -71,8 +70,8 @@ def with_more_overlap(planned: Plan, pair: PairPlan) -> PairPlan | None:
     to_the_left = np.sign(ahead[0] * other[1] - ahead[1] * other[0]) or 1.0
     for number, side in ((first, to_the_left), (second, -to_the_left)):
         cameras[number] = panned(cameras[number], side * OVERLAP_DEG / 2)
-    after = _planned_again(planned, cameras)
-    return next((one for one in after.pairs if (one.first, one.second) == (pair.first, pair.second)), None)
+    planner = planned.planner(cameras)
+    return planner.pair(first, second) if planner.both_see(first, second).any() else None
 
 
 def raised(camera: Camera, by_m: float) -> Camera:
@@ -94,10 +93,6 @@ def panned(camera: Camera, to_the_left_deg: float) -> Camera:
     """Return the camera turned about the vertical, counter-clockwise seen from above."""
     turn = rotation_matrices(np.array([0.0, 0.0, np.radians(-to_the_left_deg)]))
     return camera.with_pose(Pose(rotation_vectors(camera.pose.matrix @ turn), camera.pose.position))
-
-
-def _planned_again(planned: Plan, cameras: Sequence[Camera]) -> Plan:
-    return plan(planned.pitch, cameras, planned.state, planned.hidden)
 
 
 def _change(before: Array, after: Array) -> Change:
