@@ -15,8 +15,9 @@ from benchmarks.truth import apart
 from worker.calibration.geometry.camera import Array, Camera
 from worker.calibration.geometry.far_marking import on_the_ground
 from worker.calibration.geometry.field import Field
-from worker.calibration.planning.line_state import STATES, LineState, StateName
+from worker.calibration.planning.line_state import STATES, LineState, StateName, expect_measurements
 from worker.calibration.planning.plan import Plan, plan
+from worker.calibration.refinement.expected_errors import ErrorModel
 
 QUANTITIES = {
     "rotation": "rotation of the pose",
@@ -39,29 +40,39 @@ class Ratio:
 
 
 def chosen_states(venues: Sequence[BuiltVenue]) -> Iterator[str]:
-    """Yield the noise model that the choosing half of the venues measures, a row for each state."""
-    yield table_head("state | cameras | points of lines measured, by width in px | measured | width_px | misfit_px")
+    """Yield the noise model that the choosing half of the venues speaks for, a row for each state."""
+    yield table_head("state | cameras | points of lines measured, by width in px | measured | misfit_px")
     for state in STATES:
-        each = [one for venue in venues if venue.chooses and venue.state == state for one in calibrated(venue)]
-        each = [one for one in each if one.accepted]
+        half = [venue for venue in venues if venue.chooses and venue.state == state]
+        each = [one for venue in half for one in calibrated(venue) if one.accepted]
         if not each:
             continue
         expected, measured = (np.sum([getattr(one, name) for one in each], axis=0) for name in ("expected", "measured"))
-        shares = measured / np.maximum(expected, 1)
-        classes = zip(pairwise(WIDTHS_PX), shares, strict=True)
-        widths = [f"{low:g} to {high:g}: {share:.0%}" for (low, high), share in classes]
-        fit = _fitted(expected, shares, float(np.median([one.misfit_px for one in each])))
-        yield (
-            f"| {state} | {len(each)} | {', '.join(widths)} | {fit.measured:.2f} | {fit.width_px:.2f} "
-            f"| {fit.misfit_px:.2f} |"
-        )
+        classes = zip(pairwise(WIDTHS_PX), measured, expected, strict=True)
+        widths = [f"{low:g} to {high:g}: {found / of:.0%}" for (low, high), found, of in classes if of]
+        share = float(measured.sum() / expected.sum())
+        yield f"| {state} | {len(each)} | {', '.join(widths)} | {share:.2f} | {_misfit_px(half, share):.2f} |"
 
 
-def _fitted(expected: Array, shares: Array, misfit_px: float) -> LineState:
-    """Return the state of the least squares of shares (W,) by width, each of so many `expected` points."""
-    width = np.sqrt(np.array(WIDTHS_PX[:-1]) * WIDTHS_PX[1:])
-    tried = [LineState(most, half, misfit_px) for most in np.arange(0.3, 1.0, 0.01) for half in np.arange(0.1, 2, 0.02)]
-    return min(tried, key=lambda one: float(np.sum(expected * (one.share(width) - shares) ** 2)))
+def _misfit_px(venues: Sequence[BuiltVenue], measured: float) -> float:
+    """Return the misfit with which the refined poses, which measurement decides, are as far off as expected."""
+    tried = np.arange(0.0, 1.01, 0.05)
+    off = [abs(np.log(_refined_ratio(venues, LineState(measured, float(misfit))))) for misfit in tried]
+    return float(tried[int(np.argmin(off))])
+
+
+def _refined_ratio(venues: Sequence[BuiltVenue], state: LineState) -> float:
+    """Return actual errors of refined poses over expected ones, root of the mean square over turns and positions."""
+    ratios = []
+    for venue in venues:
+        measured = [expect_measurements(venue.pitch.line_points(), camera, state) for camera in venue.cameras]
+        errors = ErrorModel(venue.pitch, venue.cameras).expect(measured)
+        for number, one in enumerate(calibrated(venue)):
+            if one.accepted:
+                sigma = errors.sigma(number, errors.refined)
+                metres, degrees = apart(one.refined, venue.real[number])
+                ratios += [metres / sigma.position_m, degrees / sigma.rotation_deg]
+    return rms(ratios)
 
 
 def ratios(venues: Sequence[BuiltVenue], states: dict[StateName, LineState]) -> Iterator[str]:

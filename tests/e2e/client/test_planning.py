@@ -4,7 +4,7 @@ import json
 
 import cv2
 
-from testbed.synthetic import PITCH, pair
+from testbed.synthetic import CROWNED, pair
 from testbed.venue_documents import venue_document
 from tests.e2e.commands import esc_here
 
@@ -17,7 +17,7 @@ def planned(folder, cameras, *more):
 
 
 def test_a_plan_is_a_document_maps_in_numbers_and_pictures(tmp_path):
-    (tmp_path / "venue.json").write_text(json.dumps(venue_document("ground", PITCH, pair())))
+    (tmp_path / "venue.json").write_text(json.dumps(venue_document("ground", CROWNED, pair())))
     said = esc_here(tmp_path, "plan", "venue.json", "-o", "out", "--lines", "worn")
     assert said.returncode == 0, said.stderr
     answer = json.loads((tmp_path / "out" / "plan.json").read_text())

@@ -7,7 +7,7 @@ from pydantic import ValidationError
 from service.formats.opentrackio import AHEAD_IS_Y, pan_tilt_roll
 from service.schemas.find import SoughtSite
 from service.schemas.plan import PlannedSite
-from testbed.synthetic import PITCH, pair
+from testbed.synthetic import CROWNED, PITCH, pair
 from testbed.venue_documents import venue_document
 from worker.jobs import planning
 
@@ -62,19 +62,19 @@ def test_a_camera_with_half_a_place_or_two_lenses_is_refused_in_words(given, wor
 
 
 def test_a_whole_venue_is_planned_at_its_stored_poses():
-    venue = venue_document("ground", PITCH, pair())
+    venue = venue_document("ground", CROWNED, pair())
     found = planning.solve(PlannedSite.model_validate(venue), "worn", 0.1)
     assert [camera.id for camera in found.result.cameras] == ["left", "right"]
     assert found.result.calibratable
-    assert found.result.pairs[0].markings_m["halfway line"] > 30
+    assert {"halfway line", "centre circle"} <= set(found.result.pairs[0].markings_m)
     assert sum(found.result.covered.values()) == pytest.approx(1.0, abs=1e-3)
     assert len(found.maps.place_m) == len(found.maps.y_m)
     assert {"place.png", "coverage.png", "pixels-per-metre.png", "place-left.png"} <= set(found.pictures)
 
 
 def test_a_stand_gets_cameras_and_the_plan_is_a_site_to_search_for_them():
-    stand = {"id": "mast", "position": [0.0, -49.0, 12.0], "cameras": 2, "image_size": [1920, 1080]}
-    place = PlannedSite.model_validate({"field": {"template": "football"}, "stands": [stand]})
+    stand = {"id": "mast", "position": [0.0, -12.0, 5.0], "cameras": 2, "image_size": [1920, 1080]}
+    place = PlannedSite.model_validate({"field": {"template": "volleyball"}, "stands": [stand]})
     found = planning.solve(place, "fresh", 0.0).result
     assert [camera.id for camera in found.cameras] == ["mast-1", "mast-2"]
     assert found.cameras[0].pan_deg < 0 < found.cameras[1].pan_deg

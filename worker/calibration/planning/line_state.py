@@ -8,9 +8,9 @@ from typing import Literal
 
 import numpy as np
 
-from worker.calibration.detection.line_matching import filter_reach
+from worker.calibration.detection.line_matching import WIDTH_CLASSES_PX, filter_reach
 from worker.calibration.detection.line_measurement import Measurements
-from worker.calibration.geometry.camera import Array, Camera
+from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.field import LinePoints
 from worker.calibration.geometry.visibility import VisibleLines
 
@@ -21,26 +21,22 @@ StateName = Literal["fresh", "worn", "night"]
 class LineState:
     """State of the lines: how much of them is measured, and how well.
 
-    `measured`: share 0..1 of the points of a wide line that are measured, the rest being worn off or behind players;
-    `width_px`: of lines that are measured half as often, because they are so thin in the picture; `misfit_px`: what a
-    measurement is off by beyond its noise, alike over 10 px of line (`Measurements.misfit_px`).
+    `measured`: share 0..1 of the points of lines in view that are measured, the rest being worn off or behind players;
+    `misfit_px`: what a measurement is off by beyond its noise, alike over 10 px of line (`Measurements.misfit_px`).
     """
 
     measured: float
-    width_px: float
     misfit_px: float
-
-    def share(self, width_px: Array) -> Array:
-        """Return the share (N,) of points measured on lines so wide in the picture, px."""
-        return np.asarray(self.measured * width_px**2 / (width_px**2 + self.width_px**2), dtype=float)
 
 
 STATES: Mapping[StateName, LineState] = {
-    "fresh": LineState(0.9, 0.5, 0.3),
-    "worn": LineState(0.6, 0.7, 0.4),
-    "night": LineState(0.85, 0.6, 0.35),
+    "fresh": LineState(0.94, 0.0),
+    "worn": LineState(0.82, 0.0),
+    "night": LineState(0.92, 0.0),
 }
-"""States that `python -m benchmarks.planning` measured in rendered frames."""
+"""States that `python -m benchmarks.planning --only states` measured in rendered frames, 22 players in each."""
+LEAST_WIDTH_PX = WIDTH_CLASSES_PX[0][0]
+"""Width in the picture below which no line is measured."""
 
 
 def expect_measurements(lines: LinePoints, camera: Camera, state: LineState, hidden: float = 0.0) -> Measurements:
@@ -52,7 +48,8 @@ def expect_measurements(lines: LinePoints, camera: Camera, state: LineState, hid
     seen = VisibleLines.from_camera(lines, camera)
     # The whole of the matched filter has to lie in the picture.
     aside = filter_reach(seen.width_px)[:, None] * seen.normal
-    seen = seen[camera.sees(seen.pixel + aside) & camera.sees(seen.pixel - aside)]
+    wide_enough = seen.width_px >= LEAST_WIDTH_PX
+    seen = seen[wide_enough & camera.sees(seen.pixel + aside) & camera.sees(seen.pixel - aside)]
     return Measurements(
         seen.index,
         seen.points,
@@ -61,6 +58,6 @@ def expect_measurements(lines: LinePoints, camera: Camera, state: LineState, hid
         seen.px_per_metre,
         seen.px_per_metre_up,
         seen.length_px,
-        (1 - hidden) * state.share(seen.width_px),
+        np.full(len(seen), (1 - hidden) * state.measured),
         state.misfit_px,
     )

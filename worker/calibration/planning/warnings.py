@@ -11,6 +11,7 @@ import numpy as np
 from worker.calibration.diagnostics.registration import pairs_in_common
 from worker.calibration.gate.quality import GATE
 from worker.calibration.geometry.visibility import VisibleLines
+from worker.calibration.planning.line_state import LEAST_WIDTH_PX
 from worker.calibration.planning.plan import CameraPlan, Plan
 from worker.calibration.refinement.least_squares import FEWEST_MEASUREMENTS
 
@@ -90,13 +91,13 @@ def _share_across(one: CameraPlan) -> float:
 
 def _resolution(planned: Plan, one: CameraPlan) -> Iterator[PlanWarning]:
     seen = VisibleLines.from_camera(planned.pitch.line_points(), one.camera)
-    thin = float(np.mean(seen.width_px < planned.state.width_px))
+    thin = float(np.mean(seen.width_px < LEAST_WIDTH_PX))
     if thin > MUCH:
         yield PlanWarning(
             "thin-lines",
             [one.camera.id],
-            f"{thin:.0%} of the lines in view are thinner than {planned.state.width_px:g} px and seldom measured: more "
-            "height, a longer lens or more pixels would show them",
+            f"{thin:.0%} of the lines in view are thinner than {LEAST_WIDTH_PX:g} px and not measured: more height, a "
+            "longer lens or more pixels would show them",
         )
     coarse = float(
         np.mean(one.px_per_metre_along[one.seen] < GATE.largest_ground_sigma_px / GATE.largest_ground_sigma_m)
