@@ -15,9 +15,8 @@ from benchmarks.truth import apart
 from worker.calibration.geometry.camera import Array, Camera
 from worker.calibration.geometry.far_marking import on_the_ground
 from worker.calibration.geometry.field import Field
-from worker.calibration.planning.line_state import STATES, LineState, StateName, expect_measurements
+from worker.calibration.planning.line_state import STATES, LineState, StateName
 from worker.calibration.planning.plan import Plan, plan
-from worker.calibration.refinement.expected_errors import ErrorModel
 
 QUANTITIES = {
     "rotation": "rotation of the pose",
@@ -28,6 +27,10 @@ QUANTITIES = {
     "place": "place on the ground, with the unevenness of the ground",
     "stitch": "distance between the places of two cameras",
 }
+
+
+ALIKE = (1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0)
+"""Numbers of neighbouring line points whose errors may be the same."""
 
 
 @dataclass(frozen=True)
@@ -41,38 +44,29 @@ class Ratio:
 
 def chosen_states(venues: Sequence[BuiltVenue]) -> Iterator[str]:
     """Yield the noise model that the choosing half of the venues speaks for, a row for each state."""
-    yield table_head("state | cameras | points of lines measured, by width in px | measured | misfit_px")
+    half = [venue for venue in venues if venue.chooses]
+    yield table_head("state | cameras | points of lines measured, by width in px | measured")
+    shares = {}
     for state in STATES:
-        half = [venue for venue in venues if venue.chooses and venue.state == state]
-        each = [one for venue in half for one in calibrated(venue) if one.accepted]
+        each = [one for venue in half if venue.state == state for one in calibrated(venue) if one.accepted]
         if not each:
             continue
         expected, measured = (np.sum([getattr(one, name) for one in each], axis=0) for name in ("expected", "measured"))
         classes = zip(pairwise(WIDTHS_PX), measured, expected, strict=True)
         widths = [f"{low:g} to {high:g}: {found / of:.0%}" for (low, high), found, of in classes if of]
-        share = float(measured.sum() / expected.sum())
-        yield f"| {state} | {len(each)} | {', '.join(widths)} | {share:.2f} | {_misfit_px(half, share):.2f} |"
+        shares[state] = float(measured.sum() / expected.sum())
+        yield f"| {state} | {len(each)} | {', '.join(widths)} | {shares[state]:.2f} |"
+    misfit = {
+        alike: _misfit(half, {state: LineState(share, alike) for state, share in shares.items()}) for alike in ALIKE
+    }
+    yield f"\nPoints that err alike: {min(misfit, key=misfit.__getitem__):g}."
 
 
-def _misfit_px(venues: Sequence[BuiltVenue], measured: float) -> float:
-    """Return the misfit with which the refined poses, which measurement decides, are as far off as expected."""
-    tried = np.arange(0.0, 1.01, 0.05)
-    off = [abs(np.log(_refined_ratio(venues, LineState(measured, float(misfit))))) for misfit in tried]
-    return float(tried[int(np.argmin(off))])
-
-
-def _refined_ratio(venues: Sequence[BuiltVenue], state: LineState) -> float:
-    """Return actual errors of refined poses over expected ones, root of the mean square over turns and positions."""
-    ratios = []
-    for venue in venues:
-        measured = [expect_measurements(venue.pitch.line_points(), camera, state) for camera in venue.cameras]
-        errors = ErrorModel(venue.pitch, venue.cameras).expect(measured)
-        for number, one in enumerate(calibrated(venue)):
-            if one.accepted:
-                sigma = errors.sigma(number, errors.refined)
-                metres, degrees = apart(one.refined, venue.real[number])
-                ratios += [metres / sigma.position_m, degrees / sigma.rotation_deg]
-    return rms(ratios)
+def _misfit(venues: Sequence[BuiltVenue], states: dict[StateName, LineState]) -> float:
+    """Return how far the ratios of all quantities are from 1: the sum of the squares of their logarithms."""
+    found = [ratio for venue in venues for ratio in _ratios(venue, states)]
+    by_quantity = [rms([ratio.value for ratio in found if ratio.quantity == quantity]) for quantity in QUANTITIES]
+    return float(np.sum(np.log(by_quantity) ** 2))
 
 
 def ratios(venues: Sequence[BuiltVenue], states: dict[StateName, LineState]) -> Iterator[str]:

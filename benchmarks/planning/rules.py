@@ -22,7 +22,8 @@ PITCH = Field(105.0, 68.0, 0.12, np.array([[-18.5, 0.0, 0.3], [18.5, 0.0, 0.3]])
 class Stand:
     """Two cameras on one mast beside the halfway line, each over a half of a football pitch.
 
-    `away_m` from the touchline; `wide_deg`: horizontal field of view; `closer_deg`: turned towards each other.
+    `away_m` from the touchline; `wide_deg`: horizontal field of view; `closer_deg`: turned towards each other;
+    `second_side`: -1 where the second camera stands on the other side of the pitch.
     """
 
     height_m: float = 12.0
@@ -30,21 +31,23 @@ class Stand:
     wide_deg: float = 75.0
     width_px: int = 3840
     closer_deg: float = 0.0
+    second_side: int = 1
     state: StateName = "fresh"
     hidden: float = 0.0
 
     def plan(self) -> Plan:
         """Return the plan of both cameras."""
-        cameras = [panned(self._camera(side), side * self.closer_deg / 2) for side in (-1, 1)]
-        return plan(PITCH, [cameras[0], cameras[1]], STATES[self.state], self.hidden)
+        return plan(PITCH, [self._camera(-1), self._camera(1)], STATES[self.state], self.hidden)
 
     def _camera(self, side: int) -> Camera:
         size = self.width_px, self.width_px * 9 // 16
         focal = size[0] / 2 / np.tan(np.radians(self.wide_deg / 2))
         matrix = np.array([[focal, 0, (size[0] - 1) / 2], [0, focal, (size[1] - 1) / 2], [0, 0, 1]])
-        position = [0.5 * side, -PITCH.width / 2 - self.away_m, self.height_m]
-        pose = Pose.looking_at(position, [24.0 * side, -10.0, 0.0])
-        return Camera("left" if side < 0 else "right", Intrinsics(matrix, np.zeros(5), size), pose)
+        near = 1 if side < 0 else self.second_side
+        position = [0.5 * side, -near * (PITCH.width / 2 + self.away_m), self.height_m]
+        pose = Pose.looking_at(position, [24.0 * side, -near * 10.0, 0.0])
+        camera = Camera("left" if side < 0 else "right", Intrinsics(matrix, np.zeros(5), size), pose)
+        return panned(camera, side * near * self.closer_deg / 2)
 
 
 USUAL = Stand()
@@ -59,6 +62,7 @@ STANDS = {
     "turned 5° towards each other": replace(USUAL, closer_deg=5.0),
     "turned 10° towards each other": replace(USUAL, closer_deg=10.0),
     "turned 5° apart": replace(USUAL, closer_deg=-5.0),
+    "the second one on the other side, both turned to the middle": replace(USUAL, second_side=-1, closer_deg=20.0),
     "1920 pixels wide": replace(USUAL, width_px=1920),
     "worn lines": replace(USUAL, state="worn"),
     "by night": replace(USUAL, state="night"),

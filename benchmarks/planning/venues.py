@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from statistics import NormalDist
 
 import numpy as np
 
@@ -19,18 +20,19 @@ from models.training.pitches.conditions import Conditions
 from models.training.pitches.world import build_world
 from worker.calibration.geometry.camera import Array, Camera, Frame, Pose
 from worker.calibration.geometry.field import Field
-from worker.calibration.geometry.lens import Intrinsics
+from worker.calibration.geometry.lens import LENS_PARAMETERS, SIGMA_NAMES, Intrinsics
 from worker.calibration.geometry.parameters import (
     field_measures,
     lens_parameters,
+    lens_parameters_without_heat,
     with_lens_changed,
 )
 from worker.calibration.planning.line_state import STATES, StateName
 
-VENUES = 30
+VENUES, MOST_CAMERAS = 30, 3
 SIZE = (1600, 900)
 SPORTS = ("football", "football", "rugby-union", "hockey", "football", "american-football")
-# Swell of the renderer's ground that is as uneven as the engine takes turf to be: its own is 23 mm.
+# Part of the renderer's swell, 23 mm in its octaves, of a ground that is uneven by 12 mm: turf without its roughness.
 SWELL = TURF_M / 0.0233
 # Errors of the stored poses from which calibrations begin.
 START_M, START_DEG = 0.1, 1.0
@@ -83,19 +85,59 @@ class BuiltVenue:
 
 
 def built_venue(number: int) -> BuiltVenue:
-    """Return a venue: a sport, one to three cameras beside the field or at its end, and a state of its lines."""
+    """Return a venue: a sport, one to three cameras beside the field, and a state of its lines.
+
+    It is drawn as it is built. The plan believes in a lens and a field that are off by what is expected of them.
+    """
     rng = np.random.default_rng([41, number])
-    pitch = _field(SPORTS[number % len(SPORTS)])
-    cameras = _cameras(pitch, rng)
-    real = [
-        with_lens_changed(camera, np.array([p.expected * rng.normal() for p in lens_parameters([camera])]))
-        for camera in cameras
-    ]
-    real_pitch = pitch
-    for measure in field_measures(pitch):
-        _, real_pitch = measure.applied([], real_pitch, measure.expected * rng.normal())
+    drawn = _field(SPORTS[number % len(SPORTS)])
+    drawn_cameras = _cameras(drawn, rng)
+    # No two lenses and no two fields are alike.
+    real = [_changed(camera, rng.normal(size=len(LENS_PARAMETERS))) for camera in drawn_cameras]
+    real_pitch = _resized(drawn, rng.normal(size=len(field_measures(drawn))))
+    lens_errors, field_errors = _errors(number)
     state = list(STATES)[number % len(STATES)]
+    cameras = [_stated(_changed(camera, -by)) for camera, by in zip(real, lens_errors[: len(real)], strict=True)]
+    pitch = _resized(real_pitch, -field_errors)
     return BuiltVenue(number, state, pitch, cameras, real_pitch, real, conditions_of(state, rng))
+
+
+def _errors(number: int) -> tuple[Array, Array]:
+    """Return the errors of three lenses (3, 6) and of the measures of the field (3,), in sigmas.
+
+    Those of the venues of a half are quantiles of the normal distribution, in random order (a Latin hypercube): of
+    fifteen independent ones, some half would have a ridge that is a third farther off than said.
+    """
+    half, index = (number // len(STATES)) % 2, number // (2 * len(STATES)) * len(STATES) + number % len(STATES)
+    rng = np.random.default_rng([47, half])
+    lenses = _quantiles(VENUES // 2 * MOST_CAMERAS, len(LENS_PARAMETERS), rng)
+    fields = _quantiles(VENUES // 2, 3, rng)
+    return lenses[MOST_CAMERAS * index : MOST_CAMERAS * (index + 1)], fields[index]
+
+
+def _quantiles(rows: int, columns: int, rng: np.random.Generator) -> Array:
+    normal = [NormalDist().inv_cdf((at + 0.5) / rows) for at in range(rows)]
+    values = np.array(normal) / np.sqrt(np.mean(np.square(normal)))
+    return np.stack([rng.permutation(values) for _ in range(columns)], axis=1)
+
+
+def _changed(camera: Camera, by: Array) -> Camera:
+    """Return the camera with a lens that is off by (6,) sigmas of a lens after photos of a board, and heat."""
+    return with_lens_changed(camera, np.array([p.expected for p in lens_parameters([camera])]) * by)
+
+
+def _resized(pitch: Field, by: Array) -> Field:
+    """Return the field with measures that are off by (3,) sigmas of a careful measurement."""
+    for measure, off in zip(field_measures(pitch), by.tolist(), strict=True):
+        _, pitch = measure.applied([], pitch, measure.expected * off)
+    return pitch
+
+
+def _stated(camera: Camera) -> Camera:
+    """Return the camera with the sigma of its lens, as `esc intrinsics` writes it: one that nobody states may be many
+    times as large."""
+    sigma = {SIGMA_NAMES[p.name]: p.expected for p in lens_parameters_without_heat([camera])}
+    return camera.with_lens(replace(camera.intrinsics, sigma=sigma))
 
 
 def conditions_of(state: StateName, rng: np.random.Generator) -> Conditions:

@@ -19,20 +19,21 @@ StateName = Literal["fresh", "worn", "night"]
 
 @dataclass(frozen=True)
 class LineState:
-    """State of the lines: how much of them is measured, and how well.
+    """State of the lines: how much of them is measured, and how much of that is news.
 
     `measured`: share 0..1 of the points of lines in view that are measured, the rest being worn off or behind players;
-    `misfit_px`: what a measurement is off by beyond its noise, alike over 10 px of line (`Measurements.misfit_px`).
+    `alike`: number of neighbouring points (25 cm apart) whose errors are the same, by the brush, wear and the ground
+    below, so that they count as one.
     """
 
     measured: float
-    misfit_px: float
+    alike: float = 4.0
 
 
 STATES: Mapping[StateName, LineState] = {
-    "fresh": LineState(0.94, 0.0),
-    "worn": LineState(0.82, 0.0),
-    "night": LineState(0.92, 0.0),
+    "fresh": LineState(0.94),
+    "worn": LineState(0.81),
+    "night": LineState(0.82),
 }
 """States that `python -m benchmarks.planning --only states` measured in rendered frames, 22 players in each."""
 LEAST_WIDTH_PX = WIDTH_CLASSES_PX[0][0]
@@ -42,8 +43,8 @@ LEAST_WIDTH_PX = WIDTH_CLASSES_PX[0][0]
 def expect_measurements(lines: LinePoints, camera: Camera, state: LineState, hidden: float = 0.0) -> Measurements:
     """Return what the line reader is expected to measure of a camera's frame, each line where the camera puts it.
 
-    `hidden`: share 0..1 of all lines that something covers, beyond the players of `state`. A point that is measured in
-    half of all frames has half the trust in this one.
+    `hidden`: share 0..1 of all lines that something covers, beyond the players of `state`. Trust is the part of a
+    measurement that a point is worth: a point that is measured in half of all frames has half of it.
     """
     seen = VisibleLines.from_camera(lines, camera)
     # The whole of the matched filter has to lie in the picture.
@@ -58,6 +59,5 @@ def expect_measurements(lines: LinePoints, camera: Camera, state: LineState, hid
         seen.px_per_metre,
         seen.px_per_metre_up,
         seen.length_px,
-        np.full(len(seen), (1 - hidden) * state.measured),
-        state.misfit_px,
+        np.full(len(seen), (1 - hidden) * state.measured / state.alike),
     )

@@ -184,7 +184,7 @@ class Planner:
             _on_map(seen, across),
             _on_map(seen, along),
             self._measured[number],
-            self._metres(self._measured[number].index, self._measured[number].trust),
+            self._metres(self._measured[number].index),
             self._marking_sigma(number),
         )
 
@@ -193,9 +193,7 @@ class Planner:
         seen = self.both_see(first, second)
         here, there = (self._by_ground(number)[seen[self._seen[number]]] for number in (first, second))
         stitch_m = sigmas(here - there, self._errors.as_given, self._pitch.template.uneven)
-        one, other = self._measured[first], self._measured[second]
-        index, at, also_at = np.intersect1d(one.index, other.index, return_indices=True)
-        common = self._metres(index, np.minimum(one.trust[at], other.trust[also_at]))
+        common = self._metres(np.intersect1d(self._measured[first].index, self._measured[second].index))
         names = self._cameras[first].id, self._cameras[second].id
         return PairPlan(*names, seen, float(np.sqrt(np.mean(stitch_m**2))), common)
 
@@ -220,10 +218,10 @@ class Planner:
         """Jacobian (N, 2, D + 1) of where a camera puts points (N, 3), see `ground_error_jacobian`."""
         return ground_error_jacobian(self._pitch, self._cameras[number], number, points, self._model.unknowns)
 
-    def _metres(self, index: NDArray[np.intp], trust: Array) -> Array:
-        """Return the length (K,) of each marking that measurements (M,) stand for, m."""
-        markings = len(self._pitch.markings())
-        return np.bincount(self._lines.marking[index], trust * self._lines.spacing, markings).astype(float)
+    def _metres(self, index: NDArray[np.intp]) -> Array:
+        """Return the length (K,) of each marking that is measured at line points `index` (M,), m."""
+        points = np.bincount(self._lines.marking[index], minlength=len(self._pitch.markings()))
+        return points * self._lines.spacing * self._state.measured * (1 - self._hidden)
 
 
 def _on_map(seen: Mask, values: Array) -> Array:

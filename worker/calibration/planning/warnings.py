@@ -53,7 +53,7 @@ def _of_camera(planned: Plan, one: CameraPlan) -> Iterator[PlanWarning]:
     if one.markings is None:
         yield PlanWarning("off-field", ids, "no marking of the field is in view: turn the camera, or give a wider lens")
         return
-    points = float(one.measured.trust.sum())
+    points = len(one.measured) * planned.state.measured * (1 - planned.hidden)
     if points < FEWEST_MEASUREMENTS:
         yield PlanWarning(
             "few-lines",
@@ -85,7 +85,7 @@ def _of_camera(planned: Plan, one: CameraPlan) -> Iterator[PlanWarning]:
 def _share_across(one: CameraPlan) -> float:
     """Return the share 0..1 of the measured line that runs across the direction in which most of it runs."""
     along = one.measured.points.tangent[:, :2]
-    least, most = np.linalg.eigvalsh((along * one.measured.trust[:, None]).T @ along)
+    least, most = np.linalg.eigvalsh(along.T @ along)
     return float(least / (least + most))
 
 

@@ -50,11 +50,11 @@ def test_more_height_never_makes_the_far_line_less_exact(low, more):
 
 
 @FEW
-@given(misfit=st.floats(0.0, 1.0), more=st.floats(0.01, 1.0), hidden=st.floats(0.01, 0.4))
-def test_more_noise_and_more_hidden_lines_never_make_a_measurement_more_exact(misfit, more, hidden):
-    state, one = LineState(0.9, misfit), aimed("one", (-8.0, -48.0, 12.0), (-10.0, 0.0))
+@given(alike=st.floats(1.0, 20.0), more=st.floats(0.1, 20.0), hidden=st.floats(0.01, 0.4))
+def test_more_noise_and_more_hidden_lines_never_make_a_measurement_more_exact(alike, more, hidden):
+    state, one = LineState(0.9, alike), aimed("one", (-8.0, -48.0, 12.0), (-10.0, 0.0))
     (clear,) = plan(PITCH, [one], state).cameras
-    for worse in (plan(PITCH, [one], replace(state, misfit_px=misfit + more)), plan(PITCH, [one], state, hidden)):
+    for worse in (plan(PITCH, [one], replace(state, alike=alike + more)), plan(PITCH, [one], state, hidden)):
         (other,) = worse.cameras
         assert np.all(other.measured_m[clear.seen] >= clear.measured_m[clear.seen] * (1 - 1e-9))
         assert other.refined.position_m >= clear.refined.position_m * (1 - 1e-9)
@@ -76,7 +76,7 @@ def test_a_calibration_errs_by_what_was_expected():
     known = dict.fromkeys(("skew_m", "length_m", "width_m", "ridge_height_m"), 0.001)
     hall = Field(40.0, 20.0, 0.05, None, load("handball"), sigma=known)
     one = aimed("hall", (-4.0, -19.0, 6.0), (-8.0, 0.0))
-    measured = expect_measurements(hall.line_points(), one, LineState(1.0, 0.0))
+    measured = expect_measurements(hall.line_points(), one, LineState(1.0, alike=1.0))
     sigma = ErrorModel(hall, [one]).expect([measured]).as_given
     off = []
     for _ in range(6):
