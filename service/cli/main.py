@@ -24,6 +24,7 @@ COMMANDS = {
     "worker": ("worker:worker", "Run a worker alone"),
     "calibrate": ("calibrate:calibrate", "Submit frames to a service."),
     "snapshot": ("calibrate:snapshot", "Save what the cameras show now"),
+    "plan": ("plan:plan", "Plan cameras before they are mounted."),
     "run": ("run:run", "Calibrate a venue's file by frames, without a service."),
     "intrinsics": ("onboarding:intrinsics", "Find the lens of a camera from photos of a chessboard."),
     "pose": ("onboarding:pose", "Find first poses of cameras from clicked points."),

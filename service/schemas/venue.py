@@ -181,7 +181,7 @@ class Site(NamedField):
     cameras: list[CameraIn] = Field([])
 
 
-class _VenueSettings(NamedField):
+class VenueSettings(NamedField):
     """A venue without the type of its cameras."""
 
     cameras: list[Any]
@@ -196,7 +196,7 @@ class _VenueSettings(NamedField):
     )
 
 
-class VenueIn(_VenueSettings):
+class VenueIn(VenueSettings):
     """A venue in a request."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [VENUE_EXAMPLE]})
@@ -233,7 +233,7 @@ class VenueIn(_VenueSettings):
         return Venue(**parts | {"cameras": cameras})
 
 
-class Venue(_VenueSettings):
+class Venue(VenueSettings):
     """A venue with its current poses."""
 
     cameras: list[Camera]

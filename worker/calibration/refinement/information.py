@@ -129,6 +129,19 @@ class LineLikelihood:
         return Sandwich.of(rows, heights, self._unknowns)
 
 
+def expected_information(estimate: Estimate, measured: Sequence[Measurements], unknowns: Unknowns) -> Array:
+    """Return the information (D, D) on the dense unknowns, ground marginalised, of lines whose offsets are unknown yet.
+
+    Every error is taken to be as large as its standard deviation says, so that no residual has a say: `measured` lie
+    where the cameras of the estimate expect them.
+    """
+    rows, dense = estimate.rows(measured, unknowns), unknowns.dense
+    information = normal_equations(weigh_rows(rows, estimate.heights, unknowns, tukey_weights)).information
+    of_heights = information[dense:, dense:] + estimate.ground_precision(unknowns)
+    effect = np.linalg.solve(of_heights, information[dense:, :dense])
+    return np.asarray(information[:dense, :dense] - information[:dense, dense:] @ effect, dtype=float)
+
+
 def _remembered(estimate: Estimate, memories: Sequence[CameraMemory | None], unknowns: Unknowns) -> list[Rows]:
     """Return the rows of all epochs, in the order of their views."""
     rows, view = [], len(estimate.cameras)
