@@ -1,0 +1,327 @@
+"""The engine's third page: cameras as a file of any origin has them, and frames, in; how good each is, and why, out.
+
+First the file is taken at its word: the cameras are calibrated from where it puts them, as a job does. For those that
+are not found there, in this order, the first that the gate accepts: the poses in another convention and the lens at
+another resolution, the camera turned where it stands, zoomed where it stands, anywhere, or with another lens.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from worker.calibration.calibrate import calibrate
+from worker.calibration.checking.readings import Reading, readings
+from worker.calibration.detection.segmentation import whole_frame
+from worker.calibration.diagnostics.registration import Response
+from worker.calibration.find_cameras import find_cameras
+from worker.calibration.gate.quality import CameraResult
+from worker.calibration.geometry.camera import Camera, Frame, Pose, inside
+from worker.calibration.geometry.field import Field
+from worker.calibration.geometry.lens import Lens
+from worker.calibration.geometry.plausible_pose import films_a_field
+from worker.calibration.observe import FEWEST_VISIBLE_POINTS
+from worker.calibration.records import CalibrationError, Options, Progress, ProgressReporter, Recover, Segment
+from worker.calibration.relocalisation.agreement import agreement
+from worker.calibration.relocalisation.climbing import climb
+from worker.calibration.relocalisation.field_map import FieldMap
+from worker.calibration.relocalisation.hypotheses import LENS_KNOWN, Hypotheses
+from worker.calibration.relocalisation.line_view import LineView
+from worker.calibration.relocalisation.paint import Paint
+from worker.calibration.relocalisation.sought import (
+    ANYWHERE,
+    KNOCKED_ROLL_DEG,
+    Place,
+    SoughtCamera,
+    SoughtLens,
+    unknown_lenses,
+)
+
+Search = Literal["zoomed", "anywhere", "lens"]
+TAKEN_AT_ITS_WORD = Reading((), 1.0, np.eye(3), np.eye(3), (0, 0))
+COARSE_PX, FINE_PX = 16.0, 3.0
+"""Tolerances in view pixels, 480 a frame: 2 degrees and a half of a usual lens for a camera that was turned since, and
+what is left after climbing."""
+CLIMBED, CALIBRATED = 12, 3
+"""Readings that are climbed from, and of these calibrated."""
+COST_OF_A_CAUSE = 0.02
+"""Agreement that each further cause of a reading costs: of two that fit alike the simpler one is meant."""
+LEAST_AGREEMENT = 0.34
+"""Readings that agree less with the lines after climbing are not calibrated, as `recovery.LEAST_PROPOSED`."""
+ZOOM_UNCERTAIN = 0.25
+"""Relative sigma of a focal length that somebody may have zoomed."""
+ON_ITS_MOUNT_M = 2.5
+OF_THE_FRAME = frozenset({"dark", "fogged", "blinded", "snow", "out-of-focus"})
+"""Causes for which a frame shows nothing by any pose. That of a blocked view may be the ground that a wrong pose takes
+for the field."""
+LEAST_PAINT, MOST_EXPLAINED = 200, 0.15
+"""Lines are clearly seen, and a calibration clearly explains none of them: as `recovery` has it."""
+
+
+@dataclass(frozen=True)
+class CheckedCamera:
+    """Camera of a file beside the camera that its frame shows.
+
+    `given`: as the file has it, its lens for the frame's size; `reading`: the convention in which it fits; `meant`: the
+    camera of that reading; `found`: as it was calibrated, None if it was not; `refusal`: why it was not; `is_resized`:
+    True if the lens was for pictures of another resolution; `searched`: the search that found it, None if it stands
+    where the file puts it; `explained`: share of the paint in the frame, 0..1, on the markings as the file puts them,
+    None where little paint is seen.
+    """
+
+    given: Camera
+    has_pose: bool
+    reading: Reading
+    meant: Camera
+    found: CameraResult | None
+    refusal: str | None
+    is_resized: bool = False
+    searched: Search | None = None
+    explained: float | None = None
+
+    @property
+    def is_clearly_wrong(self) -> bool:
+        """True if lines are clearly seen, and none of them where the file puts them."""
+        return self.explained is not None and self.explained <= MOST_EXPLAINED
+
+
+@dataclass(frozen=True)
+class GivenCamera:
+    """Camera as a file has it: `camera` with its lens for frames of their size.
+
+    `is_resized`: True if the file has the lens for pictures of another size; `resized`: the lens, if its numbers look
+    like those of another resolution than the file says; `has_pose`: False for a lens alone, whose pose says nothing.
+    """
+
+    camera: Camera
+    is_resized: bool = False
+    resized: Lens | None = None
+    has_pose: bool = True
+
+
+def check_cameras(
+    pitch: Field,
+    given: Sequence[GivenCamera],
+    frames: Mapping[str, Sequence[Frame]],
+    segment: Segment,
+    seed: int = 0,
+    report: Callable[[Progress], None] = lambda _: None,
+) -> list[CheckedCamera]:
+    """Return for each camera of a file how its frames `frames[camera.id]` show it. Deterministic for a `seed`."""
+    checker = _Checker(
+        pitch, {one.camera.id: one for one in given}, frames, segment, seed, ProgressReporter(report, _never)
+    )
+    checker.calibrate_as(TAKEN_AT_ITS_WORD, resized=False)
+    for reading, resized in checker.likeliest_readings():
+        checker.calibrate_as(reading, resized=resized)
+    checker.calibrate_turned()
+    checker.search()
+    return [checker.result(one.camera.id) for one in given]
+
+
+def _never() -> bool:
+    return False
+
+
+@dataclass
+class _Checker:
+    """Course of a check: the cameras that are `settled`, and why the others are not (`refusals`)."""
+
+    pitch: Field
+    given: Mapping[str, GivenCamera]
+    frames: Mapping[str, Sequence[Frame]]
+    segment: Segment
+    seed: int
+    progress: ProgressReporter
+    settled: dict[str, CheckedCamera] = field(default_factory=dict)
+    refusals: dict[str, str] = field(default_factory=dict)
+    unusable: set[str] = field(default_factory=set)
+    _responses: dict[str, Response] = field(default_factory=dict)
+
+    @property
+    def open(self) -> list[GivenCamera]:
+        """Cameras that are not settled and whose frames can be used."""
+        return [one for id, one in self.given.items() if id not in self.settled and id not in self.unusable]
+
+    def calibrate_as(self, reading: Reading, *, resized: bool) -> None:
+        """Calibrate the open cameras from where a reading of the file puts them, and settle those that are accepted."""
+        meant = {one.camera.id: self._meant(one, reading, resized) for one in self.open if one.has_pose}
+        for result in self._calibrated([camera for camera in meant.values() if self._films(camera)], "never"):
+            id = result.camera.id
+            if result.accepted:
+                self._settle(id, reading, meant[id], result, resized=resized)
+            elif not result.view.usable and result.view.cause in OF_THE_FRAME:
+                self.unusable.add(id)
+
+    def calibrate_turned(self) -> None:
+        """Calibrate the open cameras where they stand, whatever way they look."""
+        cameras = [one.camera for one in self.open if one.has_pose and self._films(one.camera)]
+        for result in self._calibrated(cameras, "accept"):
+            if result.accepted:
+                self._settle(result.camera.id, TAKEN_AT_ITS_WORD, self.given[result.camera.id].camera, result)
+
+    def search(self) -> None:
+        """Search for the open cameras: zoomed where they stand, anywhere, and through another lens."""
+        ways: dict[Search, Callable[[GivenCamera], SoughtCamera | None]] = {
+            "zoomed": self._zoomed,
+            "anywhere": self._anywhere,
+            "lens": self._through_another_lens,
+        }
+        for way, tried in ways.items():
+            sought = [one for one in (tried(given) for given in self.open) if one is not None]
+            if not sought:
+                continue
+            frames = {one.id: self.frames[one.id] for one in sought}
+            searched = find_cameras(self.pitch, sought, [], frames, self.segment, self.seed)
+            found = [one.candidates[0].camera for one in searched.cameras if one.accepted]
+            for result in self._calibrated(found, "never"):
+                if result.accepted:
+                    given = self.given[result.camera.id].camera
+                    self._settle(given.id, TAKEN_AT_ITS_WORD, given, result, searched=way)
+
+    def result(self, id: str) -> CheckedCamera:
+        """Return the answer for a camera."""
+        if id in self.settled:
+            return self.settled[id]
+        given = self.given[id]
+        explained = None
+        if id not in self.unusable:
+            paint = Paint.of(np.rint(self._response(given) * 255).astype(np.uint8))
+            if len(paint.middles) >= LEAST_PAINT:
+                explained = paint.explained_by(self.pitch, given.camera) if given.has_pose else None
+        return CheckedCamera(
+            given.camera,
+            given.has_pose,
+            TAKEN_AT_ITS_WORD,
+            given.camera,
+            None,
+            self.refusals.get(id),
+            given.is_resized,
+            explained=explained,
+        )
+
+    def likeliest_readings(self) -> Iterator[tuple[Reading, bool]]:
+        """Yield the readings, and whether with resized lenses, that agree best with the frames of the open cameras.
+
+        They are scored by all cameras together: a file has one convention.
+        """
+        for resized in (False, True):
+            cameras = [one for one in self.open if one.has_pose and (one.resized is not None or not resized)]
+            if not cameras:
+                continue
+            for reading in self._best_readings(cameras, resized)[:CALIBRATED]:
+                if self.open:
+                    yield reading, resized
+
+    def _best_readings(self, cameras: Sequence[GivenCamera], resized: bool) -> list[Reading]:
+        field_map = FieldMap.of(self.pitch)
+        views = {one.camera.id: self._view(one, resized) for one in cameras}
+        # As it stands the file was tried already, but not with a resized lens.
+        all_readings = list(readings())[0 if resized else 1 :]
+        coarse = np.zeros(len(all_readings))
+        for one in cameras:
+            view, poses = views[one.camera.id], [self._meant(one, reading, resized) for reading in all_readings]
+            filming = np.flatnonzero([films_a_field(camera.pose) for camera in poses])
+            filming = np.array([n for n in filming if self._films(poses[n])], dtype=np.intp)
+            if len(filming):
+                start = _hypotheses([poses[n].pose for n in filming], view.focal_px)
+                coarse[filming] += agreement(field_map, view, start, COARSE_PX) / len(cameras)
+        cost = COST_OF_A_CAUSE * np.array([len(reading.causes) for reading in all_readings])
+        climbed: list[tuple[float, int]] = []
+        for n in np.argsort(-(coarse - cost), kind="stable")[:CLIMBED]:
+            if coarse[n] <= 0:
+                continue
+            total = 0.0
+            for one in cameras:
+                meant = self._meant(one, all_readings[n], resized)
+                if self._films(meant):
+                    start = _hypotheses([meant.pose], views[one.camera.id].focal_px)
+                    rng = np.random.default_rng(self.seed)
+                    _, scores = climb(field_map, views[one.camera.id], start, LENS_KNOWN, rng)
+                    total += float(scores.max(initial=0.0)) / len(cameras)
+            if total >= LEAST_AGREEMENT:
+                climbed.append((total - cost[n], int(n)))
+        return [all_readings[n] for _, n in sorted(climbed, reverse=True)]
+
+    def _view(self, given: GivenCamera, resized: bool) -> LineView:
+        response = np.rint(self._response(given) * 255).astype(np.uint8)
+        return LineView.of(response, self._lens(given, resized), KNOCKED_ROLL_DEG)
+
+    def _response(self, given: GivenCamera) -> Response:
+        """Return the network's response (H, W), 0..1, to the first frame of a camera."""
+        id = given.camera.id
+        if id not in self._responses:
+            seen = self.segment(self.frames[id][0], whole_frame(given.camera.intrinsics.size))
+            self._responses[id] = (seen / np.float32(255)).astype(np.float32)
+        return self._responses[id]
+
+    def _calibrated(self, cameras: Sequence[Camera], recover: Recover) -> Sequence[CameraResult]:
+        if not cameras:
+            return []
+        options = Options(seed=self.seed, recover=recover, lens_may_drift=True)
+        try:
+            found = calibrate(
+                self.pitch, cameras, {one.id: self.frames[one.id] for one in cameras}, self.segment, options
+            )
+        except CalibrationError as error:
+            self.refusals.setdefault(error.camera, error.detail)
+            return []
+        for result in found.cameras:
+            if result.rejected_because is not None:
+                self.refusals.setdefault(result.camera.id, result.rejected_because)
+        return found.cameras
+
+    def _settle(
+        self,
+        id: str,
+        reading: Reading,
+        meant: Camera,
+        found: CameraResult,
+        *,
+        resized: bool = False,
+        searched: Search | None = None,
+    ) -> None:
+        given = self.given[id]
+        is_resized = given.is_resized or (resized and given.resized is not None)
+        self.settled[id] = CheckedCamera(
+            given.camera, given.has_pose, reading, meant, found, None, is_resized, searched
+        )
+
+    def _lens(self, given: GivenCamera, resized: bool) -> Lens:
+        return given.resized if resized and given.resized is not None else given.camera.intrinsics
+
+    def _meant(self, given: GivenCamera, reading: Reading, resized: bool) -> Camera:
+        half_sides = np.array([self.pitch.length, self.pitch.width]) / 2
+        camera = given.camera.with_lens(self._lens(given, resized))
+        return camera.with_pose(reading.pose(camera.pose, half_sides))
+
+    def _films(self, camera: Camera) -> bool:
+        """True if a camera films the field and enough of its markings to be calibrated by."""
+        if not films_a_field(camera.pose):
+            return False
+        lines = self.pitch.line_points()
+        return int(inside(camera.project(lines.position), camera.intrinsics.size).sum()) >= FEWEST_VISIBLE_POINTS
+
+    def _zoomed(self, given: GivenCamera) -> SoughtCamera | None:
+        if not given.has_pose or not films_a_field(given.camera.pose):
+            return None
+        lens = SoughtLens.around(given.camera.intrinsics, ZOOM_UNCERTAIN)
+        place = Place(position=given.camera.pose.position, radius_m=ON_ITS_MOUNT_M)
+        return SoughtCamera(given.camera.id, [lens], place, roll_sigma_deg=KNOCKED_ROLL_DEG)
+
+    def _anywhere(self, given: GivenCamera) -> SoughtCamera:
+        return SoughtCamera(given.camera.id, [SoughtLens.known(given.camera.intrinsics)], ANYWHERE)
+
+    def _through_another_lens(self, given: GivenCamera) -> SoughtCamera | None:
+        if not given.has_pose or not films_a_field(given.camera.pose):
+            return None
+        place = Place(position=given.camera.pose.position, radius_m=ON_ITS_MOUNT_M)
+        return SoughtCamera(given.camera.id, unknown_lenses(given.camera.intrinsics.size), place)
+
+
+def _hypotheses(poses: Sequence[Pose], focal_px: float) -> Hypotheses:
+    rotations, positions = np.stack([pose.matrix for pose in poses]), np.stack([pose.position for pose in poses])
+    return Hypotheses.unbent(rotations, positions, np.full(len(poses), focal_px))
