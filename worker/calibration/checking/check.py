@@ -14,21 +14,17 @@ from typing import Literal
 import numpy as np
 
 from worker.calibration.calibrate import calibrate
-from worker.calibration.checking.readings import Reading, readings
+from worker.calibration.checking.ranking import films_the_field, rank_readings
+from worker.calibration.checking.readings import Reading
 from worker.calibration.detection.segmentation import whole_frame
 from worker.calibration.diagnostics.registration import Response
 from worker.calibration.find_cameras import find_cameras
 from worker.calibration.gate.quality import CameraResult
-from worker.calibration.geometry.camera import Camera, Frame, Pose, inside
+from worker.calibration.geometry.camera import Camera, Frame
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.lens import Lens
 from worker.calibration.geometry.plausible_pose import films_a_field
-from worker.calibration.observe import FEWEST_VISIBLE_POINTS
 from worker.calibration.records import CalibrationError, Options, Progress, ProgressReporter, Recover, Segment
-from worker.calibration.relocalisation.agreement import agreement
-from worker.calibration.relocalisation.climbing import climb
-from worker.calibration.relocalisation.field_map import FieldMap
-from worker.calibration.relocalisation.hypotheses import LENS_KNOWN, Hypotheses
 from worker.calibration.relocalisation.line_view import LineView
 from worker.calibration.relocalisation.paint import Paint
 from worker.calibration.relocalisation.sought import (
@@ -42,15 +38,8 @@ from worker.calibration.relocalisation.sought import (
 
 Search = Literal["zoomed", "anywhere", "lens"]
 TAKEN_AT_ITS_WORD = Reading((), 1.0, np.eye(3), np.eye(3), (0, 0))
-COARSE_PX, FINE_PX = 16.0, 3.0
-"""Tolerances in view pixels, 480 a frame: 2 degrees and a half of a usual lens for a camera that was turned since, and
-what is left after climbing."""
-CLIMBED, CALIBRATED = 12, 3
-"""Readings that are climbed from, and of these calibrated."""
-COST_OF_A_CAUSE = 0.02
-"""Agreement that each further cause of a reading costs: of two that fit alike the simpler one is meant."""
-LEAST_AGREEMENT = 0.34
-"""Readings that agree less with the lines after climbing are not calibrated, as `recovery.LEAST_PROPOSED`."""
+CALIBRATED = 3
+"""Readings that are calibrated from, of those that are likelier than the file at its word."""
 ZOOM_UNCERTAIN = 0.25
 """Relative sigma of a focal length that somebody may have zoomed."""
 ON_ITS_MOUNT_M = 2.5
@@ -149,7 +138,8 @@ class _Checker:
     def calibrate_as(self, reading: Reading, *, resized: bool) -> None:
         """Calibrate the open cameras from where a reading of the file puts them, and settle those that are accepted."""
         meant = {one.camera.id: self._meant(one, reading, resized) for one in self.open if one.has_pose}
-        for result in self._calibrated([camera for camera in meant.values() if self._films(camera)], "never"):
+        filming = [camera for camera in meant.values() if films_the_field(self.pitch, camera)]
+        for result in self._calibrated(filming, "never"):
             id = result.camera.id
             if result.accepted:
                 self._settle(id, reading, meant[id], result, resized=resized)
@@ -158,7 +148,7 @@ class _Checker:
 
     def calibrate_turned(self) -> None:
         """Calibrate the open cameras where they stand, whatever way they look."""
-        cameras = [one.camera for one in self.open if one.has_pose and self._films(one.camera)]
+        cameras = [one.camera for one in self.open if one.has_pose and films_the_field(self.pitch, one.camera)]
         for result in self._calibrated(cameras, "accept"):
             if result.accepted:
                 self._settle(result.camera.id, TAKEN_AT_ITS_WORD, self.given[result.camera.id].camera, result)
@@ -204,47 +194,17 @@ class _Checker:
         )
 
     def likeliest_readings(self) -> Iterator[tuple[Reading, bool]]:
-        """Yield the readings, and whether with resized lenses, that agree best with the frames of the open cameras.
-
-        They are scored by all cameras together: a file has one convention.
-        """
+        """Yield the readings, and whether with resized lenses, by which the open cameras are calibrated next."""
         for resized in (False, True):
             cameras = [one for one in self.open if one.has_pose and (one.resized is not None or not resized)]
             if not cameras:
                 continue
-            for reading in self._best_readings(cameras, resized)[:CALIBRATED]:
+            meant = [self._meant(one, TAKEN_AT_ITS_WORD, resized) for one in cameras]
+            ranked = rank_readings(self.pitch, meant, [self._view(one, resized) for one in cameras], self.seed)
+            # At its word the file was tried already, but not with a resized lens.
+            for reading in [one for one in ranked if resized or one.causes][:CALIBRATED]:
                 if self.open:
                     yield reading, resized
-
-    def _best_readings(self, cameras: Sequence[GivenCamera], resized: bool) -> list[Reading]:
-        field_map = FieldMap.of(self.pitch)
-        views = {one.camera.id: self._view(one, resized) for one in cameras}
-        # As it stands the file was tried already, but not with a resized lens.
-        all_readings = list(readings())[0 if resized else 1 :]
-        coarse = np.zeros(len(all_readings))
-        for one in cameras:
-            view, poses = views[one.camera.id], [self._meant(one, reading, resized) for reading in all_readings]
-            filming = np.flatnonzero([films_a_field(camera.pose) for camera in poses])
-            filming = np.array([n for n in filming if self._films(poses[n])], dtype=np.intp)
-            if len(filming):
-                start = _hypotheses([poses[n].pose for n in filming], view.focal_px)
-                coarse[filming] += agreement(field_map, view, start, COARSE_PX) / len(cameras)
-        cost = COST_OF_A_CAUSE * np.array([len(reading.causes) for reading in all_readings])
-        climbed: list[tuple[float, int]] = []
-        for n in np.argsort(-(coarse - cost), kind="stable")[:CLIMBED]:
-            if coarse[n] <= 0:
-                continue
-            total = 0.0
-            for one in cameras:
-                meant = self._meant(one, all_readings[n], resized)
-                if self._films(meant):
-                    start = _hypotheses([meant.pose], views[one.camera.id].focal_px)
-                    rng = np.random.default_rng(self.seed)
-                    _, scores = climb(field_map, views[one.camera.id], start, LENS_KNOWN, rng)
-                    total += float(scores.max(initial=0.0)) / len(cameras)
-            if total >= LEAST_AGREEMENT:
-                climbed.append((total - cost[n], int(n)))
-        return [all_readings[n] for _, n in sorted(climbed, reverse=True)]
 
     def _view(self, given: GivenCamera, resized: bool) -> LineView:
         response = np.rint(self._response(given) * 255).astype(np.uint8)
@@ -298,13 +258,6 @@ class _Checker:
         camera = given.camera.with_lens(self._lens(given, resized))
         return camera.with_pose(reading.pose(camera.pose, half_sides))
 
-    def _films(self, camera: Camera) -> bool:
-        """True if a camera films the field and enough of its markings to be calibrated by."""
-        if not films_a_field(camera.pose):
-            return False
-        lines = self.pitch.line_points()
-        return int(inside(camera.project(lines.position), camera.intrinsics.size).sum()) >= FEWEST_VISIBLE_POINTS
-
     def _zoomed(self, given: GivenCamera) -> SoughtCamera | None:
         if not given.has_pose or not films_a_field(given.camera.pose):
             return None
@@ -320,8 +273,3 @@ class _Checker:
             return None
         place = Place(position=given.camera.pose.position, radius_m=ON_ITS_MOUNT_M)
         return SoughtCamera(given.camera.id, unknown_lenses(given.camera.intrinsics.size), place)
-
-
-def _hypotheses(poses: Sequence[Pose], focal_px: float) -> Hypotheses:
-    rotations, positions = np.stack([pose.matrix for pose in poses]), np.stack([pose.position for pose in poses])
-    return Hypotheses.unbent(rotations, positions, np.full(len(poses), focal_px))
