@@ -40,6 +40,8 @@ Search = Literal["zoomed", "anywhere", "lens"]
 TAKEN_AT_ITS_WORD = Reading((), 1.0, np.eye(3), np.eye(3), (0, 0))
 CALIBRATED = 3
 """Readings that are calibrated from, of those that are likelier than the file at its word."""
+READINGS_AT, SEARCH_AT = 0.1, 0.4
+"""Shares of the whole at which readings and searches begin, if they do: by the core-seconds of a zoomed pair."""
 ZOOM_UNCERTAIN = 0.25
 """Relative sigma of a focal length that somebody may have zoomed."""
 ON_ITS_MOUNT_M = 2.5
@@ -100,19 +102,17 @@ def check_cameras(
     report: Callable[[Progress], None] = lambda _: None,
 ) -> list[CheckedCamera]:
     """Return for each camera of a file how its frames `frames[camera.id]` show it. Deterministic for a `seed`."""
-    checker = _Checker(
-        pitch, {one.camera.id: one for one in given}, frames, segment, seed, ProgressReporter(report, _never)
-    )
+    progress = ProgressReporter(report, lambda: False)
+    checker = _Checker(pitch, {one.camera.id: one for one in given}, frames, segment, seed)
+    progress.at_fraction("refinement", 0.0)
     checker.calibrate_as(TAKEN_AT_ITS_WORD, resized=False)
+    progress.at_fraction("segmentation", READINGS_AT)
     for reading, resized in checker.likeliest_readings():
         checker.calibrate_as(reading, resized=resized)
+    progress.at_fraction("evolution", SEARCH_AT)
     checker.calibrate_turned()
     checker.search()
     return [checker.result(one.camera.id) for one in given]
-
-
-def _never() -> bool:
-    return False
 
 
 @dataclass
@@ -124,7 +124,6 @@ class _Checker:
     frames: Mapping[str, Sequence[Frame]]
     segment: Segment
     seed: int
-    progress: ProgressReporter
     settled: dict[str, CheckedCamera] = field(default_factory=dict)
     refusals: dict[str, str] = field(default_factory=dict)
     unusable: set[str] = field(default_factory=set)
