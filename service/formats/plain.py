@@ -1,6 +1,7 @@
 """ESC's own JSON: ids, sizes, lenses and poses in OpenCV's convention, exactly as a venue has them.
 
-Also read: a venue's file, of which the cameras count, and a lens file of `esc intrinsics`, which has no pose.
+Also read: a venue's file, of which the cameras count. A single lens without a pose is a file as `esc intrinsics` writes
+and `esc pose` takes it.
 """
 
 from __future__ import annotations
@@ -22,7 +23,11 @@ from service.schemas.geometry import Intrinsics, Pose
 
 def write(shots: Sequence[NumberedCamera]) -> bytes:
     """Return all cameras in one object."""
-    return (json.dumps({"cameras": [shot.camera.model_dump(mode="json") for shot in shots]}, indent=2) + "\n").encode()
+    cameras = [shot.camera.model_dump(mode="json") for shot in shots]
+    if len(shots) == 1 and not shots[0].has_pose:
+        lens = {name: cameras[0][name] for name in ("image_size", "intrinsics")}
+        return (json.dumps(lens, indent=2) + "\n").encode()
+    return (json.dumps({"cameras": cameras}, indent=2) + "\n").encode()
 
 
 def recognises(file: ParsedFile) -> bool:

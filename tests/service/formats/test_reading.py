@@ -16,7 +16,7 @@ from service.formats.reading import read_files
 from service.formats.records import CameraRecord
 from service.formats.rotations import matrix_of, vector_of
 from service.formats.table import FILE_FORMATS
-from service.schemas.geometry import Intrinsics, Pose
+from service.schemas.geometry import Intrinsics, LensFile, Pose
 from service.schemas.problems import Problem
 from worker.calibration.geometry.lens import LENSES
 
@@ -302,6 +302,8 @@ def test_a_lens_without_its_pose_goes_where_formats_have_lenses_alone():
         (camera,) = read_files(written(form, [lens])).cameras
         assert camera.pose is None
         assert camera.intrinsics.matrix == lens.intrinsics.matrix
+    lens_file = LensFile.model_validate_json(*written("json", [lens]).values())
+    assert lens_file.intrinsics == lens.intrinsics
     with pytest.raises(Problem, match="camera left has no pose"):
         write_cameras([lens], "colmap")
 
