@@ -144,7 +144,7 @@ def _checked(view: View, way: str) -> dict:
 def _rendered_view(name: str, number: int) -> View:
     taken = _clear_shots(name, number + 1)[number]
     _, png = cv2.imencode(".png", taken.frame)
-    return View(f"{name} {number}", FieldOfPlay(template=name), _input(taken.camera), png.tobytes())
+    return View(f"{name} {number}", FieldOfPlay.model_validate({"template": name}), _input(taken.camera), png.tobytes())
 
 
 @cache

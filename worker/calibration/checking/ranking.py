@@ -75,7 +75,7 @@ def _coarse(field_map: FieldMap, view: LineView, poses: Sequence[Pose], filming:
     found = np.zeros(len(poses))
     chosen = np.flatnonzero(filming)
     if len(chosen):
-        found[chosen] = agreement(field_map, view, _hypotheses([poses[n] for n in chosen], view), COARSE_PX)
+        found[chosen] = agreement(field_map, view, _hypotheses([poses[int(n)] for n in chosen], view), COARSE_PX)
     return found
 
 
