@@ -128,4 +128,4 @@ class TrackedStreams:
         shot = NumberedCamera(camera_document(tracked.camera), self.numbers[tracked.camera.id])
         accuracy = Tracked(tracked.sigma.rotation_deg, tracked.sigma.position_m, pose.clock, pose.arrived_ns)
         self.sender.send([shot], pose.at_ns, pose.rate, tracked.how, accuracy)
-        self.sent(SentPose(shot.camera, tracked.how, pose.number, pose.at_ns, accuracy))
+        self.sent(SentPose(shot.posed, tracked.how, pose.number, pose.at_ns, accuracy))

@@ -1,1 +1,1 @@
-"""Poses and lenses in the formats of the tools that use them: cameras in, a file out."""
+"""Poses and lenses in the formats of other tools, written and read."""

@@ -76,7 +76,7 @@ class ClipPoses:
         self._number += 1
 
     def _row(self, camera: TrackedCamera) -> list[str | int]:
-        pose = camera.shot.camera.pose
+        pose = camera.shot.pose
         numbers = (*pose.rotation, *pose.position, *camera.sigma, *camera.motion_sigma)
         return [self._number, camera.shot.id, camera.status, *(f"{value:.8g}" for value in numbers)]
 

@@ -1,21 +1,41 @@
-"""COLMAP's text model: cameras.txt, images.txt and points3D.txt in a zip.
+"""COLMAP's model: cameras.txt, images.txt and points3D.txt in a zip, read also as cameras.bin and images.bin.
 
-Pixel centres are at 0.5 there and at integers here. Models: OPENCV where it is exact, else FULL_OPENCV.
+Pixel centres are at 0.5 there and at integers here. Poses take the world to OpenCV's camera; unit and axes of the world
+are whatever the model was aligned to. Written are OPENCV where it is exact, else FULL_OPENCV, and OPENCV_FISHEYE; all
+models are read but those without a counterpart (FOV, THIN_PRISM_FISHEYE and newer ones).
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
+import struct
+from collections.abc import Callable, Iterator, Sequence
 
 from service.formats.archive import archive
 from service.formats.lens import RADIAL, TANGENTIAL, NumberedCamera
+from service.formats.nodes import FileRefusedError, Node
+from service.formats.parsing import ParsedFile
+from service.formats.records import CameraRecord, camera_matrix, lens_of, stem_of
+from service.formats.rotations import pose_from_translation, quaternion, vector_of_quaternion
+from service.schemas.geometry import Intrinsics
 
-# Parameters after fx, fy, cx, cy, in COLMAP's order (src/colmap/sensor/models.h).
-MODELS = {
-    "OPENCV": ("k1", "k2", "p1", "p2"),
-    "FULL_OPENCV": ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"),
+# Numbers and parameters of the models, in COLMAP's order (src/colmap/sensor/models.h). The names of FISHEYE models are
+# those of `cv2.fisheye`; None: a lens that OpenCV does not have.
+MODELS: dict[str, tuple[int, tuple[str, ...] | None]] = {
+    "SIMPLE_PINHOLE": (0, ("f", "cx", "cy")),
+    "PINHOLE": (1, ("fx", "fy", "cx", "cy")),
+    "SIMPLE_RADIAL": (2, ("f", "cx", "cy", "k1")),
+    "RADIAL": (3, ("f", "cx", "cy", "k1", "k2")),
+    "OPENCV": (4, ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2")),
+    "OPENCV_FISHEYE": (5, ("fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4")),
+    "FULL_OPENCV": (6, ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")),
+    "FOV": (7, None),
+    "SIMPLE_RADIAL_FISHEYE": (8, ("f", "cx", "cy", "k1")),
+    "RADIAL_FISHEYE": (9, ("f", "cx", "cy", "k1", "k2")),
+    "THIN_PRISM_FISHEYE": (10, None),
+    "RAD_TAN_THIN_PRISM_FISHEYE": (11, None),
 }
+COEFFICIENT_ORDER = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
+POINT2D_BYTES = 24
 
 
 def write(shots: Sequence[NumberedCamera]) -> bytes:
@@ -40,27 +60,172 @@ def _name(shot: NumberedCamera) -> str:
 
 
 def _camera(number: int, shot: NumberedCamera) -> str:
-    shot.require_support("colmap", {*RADIAL, *TANGENTIAL})
-    coefficients = shot.coefficients
-    enough = not any(coefficients[name] for name in RADIAL if name not in MODELS["OPENCV"])
-    model = "OPENCV" if enough else "FULL_OPENCV"
+    if shot.is_fisheye:
+        model, coefficients = "OPENCV_FISHEYE", shot.fisheye_coefficients
+    else:
+        shot.require_support("colmap", {*RADIAL, *TANGENTIAL})
+        needs_all = any(shot.coefficients[name] for name in ("k3", "k4", "k5", "k6"))
+        model = "FULL_OPENCV" if needs_all else "OPENCV"
+        coefficients = [shot.coefficients[name] for name in COEFFICIENT_ORDER[: 8 if needs_all else 4]]
     centre = [value + 0.5 for value in shot.principal]
-    parameters = [*shot.focal, *centre, *(coefficients[name] for name in MODELS[model])]
-    return _line(number, model, *shot.size, *map(float, parameters))
+    return _line(number, model, *shot.size, *map(float, [*shot.focal, *centre, *coefficients]))
 
 
 def _image(number: int, shot: NumberedCamera) -> str:
-    pose = shot.camera.pose
+    pose = shot.pose
     return _line(number, *quaternion(pose.rotation), *pose.translation, number, _name(shot))
-
-
-def quaternion(rotation: Sequence[float]) -> list[float]:
-    """Return the unit quaternion (w, x, y, z) of a Rodrigues vector (rad)."""
-    angle = math.hypot(*rotation)
-    # sin(a/2)/a -> 1/2.
-    scale = math.sin(angle / 2) / angle if angle > 1e-12 else 0.5
-    return [math.cos(angle / 2), *(scale * component for component in rotation)]
 
 
 def _line(*words: str | float) -> str:
     return " ".join(word if isinstance(word, str) else repr(word) for word in words)
+
+
+def recognises(file: ParsedFile) -> bool:
+    """True for lines of cameras or images, and for bytes that are cameras or images to their end."""
+    if file.kind == "binary":
+        return any(_ends_well(parse, file) for parse in (_binary_cameras, _binary_images))
+    return file.kind == "colmap"
+
+
+def read(files: Sequence[ParsedFile]) -> list[CameraRecord]:
+    """Return a camera for each image, or for each of the cameras where the files have no images."""
+    lenses: dict[int, tuple[Intrinsics, tuple[int, int]]] = {}
+    images: list[tuple[Node, list[float], int, str]] = []
+    for file in files:
+        if file.kind == "binary":
+            is_cameras = _ends_well(_binary_cameras, file)
+            lenses |= dict(_binary_cameras(file)) if is_cameras else {}
+            images += [] if is_cameras else _binary_images(file)
+        elif _is_cameras(file):
+            lenses |= dict(_text_cameras(file))
+        else:
+            images += _text_images(file)
+    if not images:
+        return [CameraRecord(f"camera-{number}", *lens) for number, lens in lenses.items()]
+    return [_posed(node, numbers, camera, name, lenses) for node, numbers, camera, name in images]
+
+
+def _posed(
+    node: Node,
+    numbers: Sequence[float],
+    camera: int,
+    name: str,
+    lenses: dict[int, tuple[Intrinsics, tuple[int, int]]],
+) -> CameraRecord:
+    if camera not in lenses:
+        raise FileRefusedError(node.file, node.place, "a camera of cameras.txt or cameras.bin", f"camera {camera}")
+    lens, size = lenses[camera]
+    if not any(numbers[:4]):
+        node.refuse("a quaternion that is not 0")
+    pose = pose_from_translation(vector_of_quaternion(numbers[:4]), list(numbers[4:7]))
+    return CameraRecord(stem_of(name), lens, size, pose)
+
+
+def _lens(node: Node, model: str, parameters: Sequence[float]) -> Intrinsics:
+    names = MODELS[model][1] if model in MODELS else None
+    if names is None:
+        known = ", ".join(name for name, (_, parts) in MODELS.items() if parts)
+        raise FileRefusedError(node.file, node.place, f"a model that OpenCV has too ({known})", model)
+    if len(parameters) != len(names):
+        raise FileRefusedError(
+            node.file, node.place, f"{len(names)} parameters of {model} ({', '.join(names)})", f"{len(parameters)}"
+        )
+    k = dict(zip(names, parameters, strict=True))
+    fx, fy = k.get("fx", k.get("f", 0.0)), k.get("fy", k.get("f", 0.0))
+    matrix = camera_matrix(fx, fy, k["cx"] - 0.5, k["cy"] - 0.5)
+    is_fisheye = model.endswith("FISHEYE")
+    order = ("k1", "k2", "k3", "k4") if is_fisheye else COEFFICIENT_ORDER
+    last = max((n for n, name in enumerate(order, start=1) if name in k), default=0)
+    coefficients = [k.get(name, 0.0) for name in order[:last]]
+    return lens_of(node, matrix, coefficients, "fisheye" if is_fisheye else "opencv")
+
+
+def _is_cameras(file: ParsedFile) -> bool:
+    words = next(iter(_lines(file)))[1].split()
+    return len(words) > 3 and words[1].replace("_", "").isalpha() and words[2].isdigit()
+
+
+def _lines(file: ParsedFile) -> Iterator[tuple[Node, str]]:
+    """Yield the lines that are no comments; empty ones too, for images without points have one."""
+    for number, line in enumerate(file.content.splitlines(), start=1):
+        if not line.startswith("#"):
+            yield Node(file.name, f"line {number}", line), line
+
+
+def _text_cameras(file: ParsedFile) -> Iterator[tuple[int, tuple[Intrinsics, tuple[int, int]]]]:
+    for node, line in _lines(file):
+        if not line.strip():
+            continue
+        words = line.split()
+        if len(words) < 5:
+            node.refuse("CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]")
+        number, _, width, height, *parameters = (_number(node, word) for word in [words[0], "0", *words[2:]])
+        yield int(number), (_lens(node, words[1], parameters), (int(width), int(height)))
+
+
+def _text_images(file: ParsedFile) -> Iterator[tuple[Node, list[float], int, str]]:
+    lines = _lines(file)
+    for node, line in lines:
+        if not line.strip():
+            continue
+        words = line.split(maxsplit=9)
+        if len(words) < 10:
+            node.refuse("IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME")
+        numbers = [_number(node, word) for word in words[1:9]]
+        yield node, numbers[:7], int(numbers[7]), words[9]
+        # Its points.
+        next(lines, None)
+
+
+def _number(node: Node, word: str) -> float:
+    try:
+        return Node(node.file, node.place, float(word)).number()
+    except ValueError:
+        raise FileRefusedError(node.file, node.place, "finite numbers", word) from None
+
+
+def _ends_well(parse: Callable[[ParsedFile], Iterator[object]], file: ParsedFile) -> bool:
+    """True if bytes are what a parser reads, up to their end."""
+    try:
+        return bool(list(parse(file)))
+    except (FileRefusedError, struct.error, UnicodeDecodeError):
+        return False
+
+
+def _binary_cameras(file: ParsedFile) -> Iterator[tuple[int, tuple[Intrinsics, tuple[int, int]]]]:
+    """Yield the cameras of cameras.bin: id, number of the model, width, height, parameters; little-endian."""
+    by_number = {number: (name, parts) for name, (number, parts) in MODELS.items()}
+    (count,) = struct.unpack_from("<Q", file.content)
+    at = 8
+    for _ in range(count):
+        node = Node(file.name, f"byte {at}", None)
+        camera, model, width, height = struct.unpack_from("<iiQQ", file.content, at)
+        name, parts = by_number.get(model, (f"number {model}", None))
+        length = len(parts or ())
+        parameters = struct.unpack_from(f"<{length}d", file.content, at + 24)
+        yield camera, (_lens(node, name, parameters), (width, height))
+        at += 24 + 8 * length
+    _require_end(file, at)
+
+
+def _binary_images(file: ParsedFile) -> Iterator[tuple[Node, list[float], int, str]]:
+    """Yield the images of images.bin: id, quaternion, translation, camera, name that ends with 0, points."""
+    (count,) = struct.unpack_from("<Q", file.content)
+    at = 8
+    for _ in range(count):
+        node = Node(file.name, f"byte {at}", None)
+        _, *numbers, camera = struct.unpack_from("<i7di", file.content, at)
+        at += 64
+        end = file.content.find(b"\0", at)
+        if end < 0:
+            node.refuse("a name that ends")
+        name = file.content[at:end].decode()
+        (points,) = struct.unpack_from("<Q", file.content, end + 1)
+        yield node, numbers, camera, name
+        at = end + 9 + POINT2D_BYTES * points
+    _require_end(file, at)
+
+
+def _require_end(file: ParsedFile, at: int) -> None:
+    if at != len(file.content):
+        raise FileRefusedError(file.name, f"byte {at}", "the end of the file", f"{len(file.content) - at} bytes")

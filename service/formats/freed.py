@@ -16,8 +16,9 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from service.formats.lens import NumberedCamera, product, transposed
+from service.formats.lens import NumberedCamera
 from service.formats.opentrackio import AHEAD_IS_Y, pan_tilt_roll
+from service.formats.rotations import product, transposed
 from service.schemas.problems import Problem
 
 STEPS_PER_DEGREE = 32768
@@ -57,7 +58,7 @@ def _packet(shot: NumberedCamera, axes: str, counts: EncoderCounts) -> bytes:
 
 def _mapped(shot: NumberedCamera, axes: str) -> list[float]:
     pan, tilt, roll = pan_tilt_roll(product(transposed(shot.rotation), transposed(AHEAD_IS_Y)))
-    values = dict(zip("xyz", shot.camera.pose.position, strict=True))
+    values = dict(zip("xyz", shot.pose.position, strict=True))
     values |= {"pan": -math.degrees(pan), "tilt": math.degrees(tilt), "roll": math.degrees(roll)}
     found = [_value(match, values) for match in AXIS.finditer(axes)]
     return found[:3] + [math.remainder(angle, 360) for angle in found[3:]]

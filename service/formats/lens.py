@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass
 
+from service.formats.rotations import Matrix, matrix_of
+from service.schemas.geometry import Pose, PosedCamera, UnposedCamera
 from service.schemas.problems import Problem
-from service.schemas.rotation import rotate
-from service.schemas.venue import Camera
 
 # OpenCV's order.
 COEFFICIENTS = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4", "tau_x", "tau_y")
@@ -15,20 +15,53 @@ RADIAL = ("k1", "k2", "k3", "k4", "k5", "k6")
 TANGENTIAL = ("p1", "p2")
 THIN_PRISM = ("s1", "s2", "s3", "s4")
 
-Matrix = list[list[float]]
-
 
 @dataclass(frozen=True)
 class NumberedCamera:
-    """A camera with its pose and its number in the venue, from 1, which formats without names have."""
+    """A camera with its number in the venue, from 1, which formats without names have.
 
-    camera: Camera
+    `camera`: a `PosedCamera`, but of files that have lenses alone.
+    """
+
+    camera: UnposedCamera
     number: int
 
     @property
     def id(self) -> str:
         """Id of the camera."""
         return self.camera.id
+
+    @property
+    def posed(self) -> PosedCamera:
+        """The camera; refuses one without a pose, which most formats have no way to say."""
+        if not isinstance(self.camera, PosedCamera):
+            raise Problem(
+                "format-cannot-hold",
+                f"camera {self.id} has no pose; opencv, ros, kalibr, caliscope and json hold lenses alone.",
+                camera=self.id,
+                got=["no pose"],
+            )
+        return self.camera
+
+    @property
+    def pose(self) -> Pose:
+        """Pose of the camera; refuses one without."""
+        return self.posed.pose
+
+    @property
+    def has_pose(self) -> bool:
+        """True unless only the lens of the camera is known."""
+        return isinstance(self.camera, PosedCamera)
+
+    @property
+    def is_fisheye(self) -> bool:
+        """True for OpenCV's fisheye lens (Kannala-Brandt)."""
+        return self.camera.intrinsics.model == "fisheye"
+
+    @property
+    def fisheye_coefficients(self) -> list[float]:
+        """Coefficients k1 to k4 of a fisheye lens."""
+        return [*(self.camera.intrinsics.distortion or [0.0] * 4)]
 
     @property
     def focal(self) -> tuple[float, float]:
@@ -57,14 +90,11 @@ class NumberedCamera:
     @property
     def rotation(self) -> Matrix:
         """Rotation matrix (3, 3), world to camera."""
-        columns = [
-            rotate(self.camera.pose.rotation, axis) for axis in ([1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0])
-        ]
-        return [list(row) for row in zip(*columns, strict=True)]
+        return matrix_of(self.pose.rotation)
 
     def require_support(self, name: str, supported: Collection[str]) -> None:
         """Refuse a lens with skew or coefficients that are not `supported`: without them points are pixels off."""
-        if self.camera.intrinsics.model == "fisheye":
+        if self.is_fisheye:
             raise Problem(
                 "format-cannot-hold",
                 f"{name} has no place for the fisheye lens of camera {self.id}; json and st-map hold every lens.",
@@ -82,13 +112,3 @@ class NumberedCamera:
                 camera=self.id,
                 got=beyond,
             )
-
-
-def product(a: Matrix, b: Matrix) -> Matrix:
-    """Return the product of two matrices."""
-    return [[sum(x * y for x, y in zip(row, column, strict=True)) for column in zip(*b, strict=True)] for row in a]
-
-
-def transposed(matrix: Matrix) -> Matrix:
-    """Return the transpose of a matrix."""
-    return [list(row) for row in zip(*matrix, strict=True)]

@@ -21,7 +21,11 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from service.formats.lens import COEFFICIENTS, NumberedCamera, product, transposed
+from service.formats.lens import COEFFICIENTS, NumberedCamera
+from service.formats.nodes import Node
+from service.formats.parsing import ParsedFile
+from service.formats.records import CameraRecord, lens_of
+from service.formats.rotations import pose_from_matrix, product, transposed
 from service.schemas.problems import Problem
 
 # Pixels and the ground behind them are told at so many columns and rows of the picture, where the ground is no farther
@@ -44,7 +48,7 @@ def write(shots: Sequence[NumberedCamera]) -> bytes:
 def _sensor(shot: NumberedCamera) -> dict[str, Any]:
     # Coefficients are not held, but taken off the picture before.
     shot.require_support("metropolis", COEFFICIENTS)
-    pose = shot.camera.pose
+    pose = shot.pose
     intrinsic = [[float(value) for value in row] for row in shot.camera.intrinsics.matrix]
     extrinsic = [[*row, moved] for row, moved in zip(shot.rotation, pose.translation, strict=True)]
     pairs = list(_ground_points(shot))
@@ -94,10 +98,43 @@ def _ground_behind(shot: NumberedCamera, column: int, row: int) -> tuple[float, 
     (fx, fy), (cx, cy) = shot.focal, shot.principal
     in_camera = [[(column - cx) / fx], [(row - cy) / fy], [1.0]]
     (right,), (ahead,), (up,) = product(transposed(shot.rotation), in_camera)
-    x, y, height = shot.camera.pose.position
+    x, y, height = shot.pose.position
     if up == 0 or height / -up <= 0:
         return None
     distance = height / -up
     if distance * math.hypot(right, ahead) > FARTHEST_M:
         return None
     return x + distance * right, y + distance * ahead
+
+
+def recognises(file: ParsedFile) -> bool:
+    """True for a document with sensors."""
+    return file.kind == "json" and isinstance(file.top.value, dict) and isinstance(file.top.value.get("sensors"), list)
+
+
+def read(file: ParsedFile) -> list[CameraRecord]:
+    """Return the cameras among the sensors, without distortion."""
+    kind = file.top.get("calibrationType")
+    if kind is not None and kind.value != "cartesian":
+        kind.refuse("cartesian, in metres: places on the globe are in no field")
+    sensors = file.top["sensors"].elements()
+    return [_camera(sensor) for sensor in sensors if sensor.get("type") is None or sensor["type"].value == "camera"]
+
+
+def _camera(sensor: Node) -> CameraRecord:
+    matrix = sensor["intrinsicMatrix"]
+    lens = lens_of(matrix, matrix.matrix(3, 3), [])
+    attributes = sensor.get("attributes")
+    named = {} if attributes is None else {one["name"].text(): one["value"] for one in attributes.elements()}
+    size = None
+    if "frameWidth" in named and "frameHeight" in named:
+        size = _pixels(named["frameWidth"]), _pixels(named["frameHeight"])
+    return CameraRecord(str(sensor["id"].value), lens, size, pose_from_matrix(sensor["extrinsicMatrix"]))
+
+
+def _pixels(node: Node) -> int:
+    """Return a number of pixels, which attributes have as text."""
+    text = str(node.value)
+    if not text.isascii() or not text.isdigit():
+        node.refuse("a number of pixels")
+    return int(text)

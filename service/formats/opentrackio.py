@@ -16,7 +16,12 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
-from service.formats.lens import RADIAL, TANGENTIAL, NumberedCamera, product, transposed
+from service.formats.lens import RADIAL, TANGENTIAL, NumberedCamera
+from service.formats.nodes import Node
+from service.formats.parsing import ParsedFile
+from service.formats.records import CameraRecord, camera_matrix, lens_of, stem_of
+from service.formats.rotations import Matrix, product, transposed, vector_of
+from service.schemas.geometry import Pose
 from service.schemas.problems import Problem
 
 SENSOR_WIDTH_MM = 36.0
@@ -203,7 +208,7 @@ def _lens(shot: NumberedCamera) -> dict[str, Any]:
 
 def _transform(shot: NumberedCamera, angles: tuple[float, float, float]) -> dict[str, Any]:
     pan, tilt, roll = angles
-    x, y, z = shot.camera.pose.position
+    x, y, z = shot.pose.position
     return {
         "id": "camera",
         "translation": {"x": x, "y": y, "z": z},
@@ -224,3 +229,64 @@ def pan_tilt_roll(b: list[list[float]]) -> tuple[float, float, float]:
         # Straight up or down: pan and roll turn about the same axis; the pan takes it all.
         return math.atan2(b[1][0], b[0][0]), tilt, 0.0
     return math.atan2(-b[0][1], b[1][1]), tilt, math.atan2(-b[2][0], b[2][2])
+
+
+def recognises(file: ParsedFile) -> bool:
+    """True for a sample with a lens."""
+    return file.kind == "json" and "transforms" in file.top and "lens" in file.top
+
+
+def read(file: ParsedFile) -> list[CameraRecord]:
+    """Return the camera of a sample, by its label or else its file's name."""
+    camera, lens = file.top["static"]["camera"], file.top["lens"]
+    resolution, sensor = camera["activeSensorResolution"], camera["activeSensorPhysicalDimensions"]
+    size = resolution["width"].integer(1), resolution["height"].integer(1)
+    focal = lens["pinholeFocalLength"].number()
+    per_mm = [side / sensor[name].number() for side, name in zip(size, ("width", "height"), strict=True)]
+    offset = lens.get("projectionOffset")
+    moved = [0.0, 0.0] if offset is None else [offset[axis].number() for axis in "xy"]
+    centre = [side / 2 + scale * by for side, scale, by in zip(size, per_mm, moved, strict=True)]
+    matrix = camera_matrix(per_mm[0] * focal, per_mm[1] * focal, *centre)
+    coefficients = [] if "distortion" not in lens else _coefficients(lens["distortion"].elements()[0], focal)
+    label = camera.get("label")
+    name = label.text() if label is not None else stem_of(file.name)
+    return [CameraRecord(name, lens_of(lens, matrix, coefficients), size, _pose(file.top))]
+
+
+def _coefficients(model: Node, focal: float) -> list[float]:
+    named = model.get("model")
+    if named is None or named.value not in ("Brown-Conrady U-D", "Brown-Conrady-Undistorted-to-Distorted"):
+        model.refuse("the model Brown-Conrady U-D; without a name, or D-U, it is the other direction")
+    radial = [
+        number * focal ** (2 * (n // 2 + 1)) for n, number in enumerate([*model["radial"].numbers(), *[0.0] * 6][:6])
+    ]
+    k1, k4, k2, k5, k3, k6 = radial
+    tangential = model.get("tangential")
+    p1, p2 = [0.0, 0.0] if tangential is None else [number * focal for number in tangential.numbers(2)]
+    coefficients = [k1, k2, p1, p2, k3, k4, k5, k6]
+    while coefficients and coefficients[-1] == 0:
+        coefficients.pop()
+    return coefficients
+
+
+def _pose(top: Node) -> Pose:
+    """Return the pose after all transforms, each in the frame of the one before, and the offset of the pupil."""
+    turned, place = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], [0.0, 0.0, 0.0]
+    for transform in top["transforms"].elements():
+        moved = [[transform["translation"][axis].number()] for axis in "xyz"]
+        place = [at + by for at, (by,) in zip(place, product(turned, moved), strict=True)]
+        angles = (transform["rotation"][name].number() for name in ("pan", "tilt", "roll"))
+        turned = product(turned, _from_pan_tilt_roll(*map(math.radians, angles)))
+    pupil = top["lens"].get("entrancePupilOffset")
+    ahead = 0.0 if pupil is None else pupil.number()
+    place = [at + ahead * row[1] for at, row in zip(place, turned, strict=True)]
+    return Pose.from_position(vector_of(transposed(product(turned, AHEAD_IS_Y))), place)
+
+
+def _from_pan_tilt_roll(pan: float, tilt: float, roll: float) -> Matrix:
+    """Return the matrix (3, 3), camera (x right, y ahead, z up) to world, of intrinsic z-x-y angles."""
+    (cp, ct, cr), (sp, st, sr) = ([turn(angle) for angle in (pan, tilt, roll)] for turn in (math.cos, math.sin))
+    about_z = [[cp, -sp, 0.0], [sp, cp, 0.0], [0.0, 0.0, 1.0]]
+    about_x = [[1.0, 0.0, 0.0], [0.0, ct, -st], [0.0, st, ct]]
+    about_y = [[cr, 0.0, sr], [0.0, 1.0, 0.0], [-sr, 0.0, cr]]
+    return product(product(about_z, about_x), about_y)

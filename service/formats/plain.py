@@ -1,13 +1,70 @@
-"""Our own JSON: ids, sizes, lenses and poses in OpenCV's convention, exactly as a venue has them."""
+"""ESC's own JSON: ids, sizes, lenses and poses in OpenCV's convention, exactly as a venue has them.
+
+Also read: a venue's file, of which the cameras count. A single lens without a pose is a file as `esc intrinsics` writes
+and `esc pose` takes it.
+"""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Sequence
 
+from pydantic import ValidationError
+
 from service.formats.lens import NumberedCamera
+from service.formats.nodes import FileRefusedError, Node
+from service.formats.parsing import ParsedFile
+from service.formats.records import CameraRecord, stem_of
+from service.formats.rotations import pose_from_translation
+from service.schemas.base import TOLERANTLY
+from service.schemas.findings import describe_errors
+from service.schemas.geometry import Intrinsics, Pose
 
 
 def write(shots: Sequence[NumberedCamera]) -> bytes:
     """Return all cameras in one object."""
-    return (json.dumps({"cameras": [shot.camera.model_dump(mode="json") for shot in shots]}, indent=2) + "\n").encode()
+    cameras = [shot.camera.model_dump(mode="json") for shot in shots]
+    if len(shots) == 1 and not shots[0].has_pose:
+        lens = {name: cameras[0][name] for name in ("image_size", "intrinsics")}
+        return (json.dumps(lens, indent=2) + "\n").encode()
+    return (json.dumps({"cameras": cameras}, indent=2) + "\n").encode()
+
+
+def recognises(file: ParsedFile) -> bool:
+    """True for a document with cameras, or with one lens."""
+    if file.kind != "json":
+        return False
+    cameras = file.top.get("cameras")
+    if cameras is not None and isinstance(cameras.value, list):
+        return any(isinstance(one, dict) and "intrinsics" in one for one in cameras.value)
+    return "intrinsics" in file.top and "image_size" in file.top
+
+
+def read(file: ParsedFile) -> list[CameraRecord]:
+    """Return the cameras of a document."""
+    cameras = file.top.get("cameras")
+    if cameras is None:
+        return [_camera(file.top, stem_of(file.name))]
+    return [_camera(camera, camera["id"].text()) for camera in cameras.elements()]
+
+
+def _camera(node: Node, name: str) -> CameraRecord:
+    width, height = (side.integer(1) for side in node["image_size"].elements(2))
+    pose = node.get("pose")
+    return CameraRecord(name, _lens(node["intrinsics"]), (width, height), None if pose is None else _pose(pose))
+
+
+def _lens(node: Node) -> Intrinsics:
+    try:
+        return Intrinsics.model_validate(node.value, **TOLERANTLY)
+    except ValidationError as error:
+        why = "; ".join(describe_errors(error.errors(), None, None))
+        raise FileRefusedError(node.file, node.place, "a lens", why) from None
+
+
+def _pose(node: Node) -> Pose:
+    rotation = node["rotation"].numbers(3)
+    if "translation" not in node:
+        return Pose.from_position(rotation, node["position"].numbers(3))
+    pose = pose_from_translation(rotation, node["translation"].numbers(3))
+    return pose if "position" not in node else pose.model_copy(update={"position": node["position"].numbers(3)})

@@ -1,4 +1,4 @@
-"""The formats, by the names that callers use."""
+"""The formats, by the names that callers use: the one table of what is written and what is read."""
 
 from __future__ import annotations
 
@@ -6,32 +6,34 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import TYPE_CHECKING
 
-from service.formats import colmap, freed, metropolis, opencv, opentrackio, plain, pose2sim, soccernet, stmap
+from service.formats import (
+    caliscope,
+    colmap,
+    freed,
+    kalibr,
+    metropolis,
+    mrcal,
+    nerf,
+    opencv,
+    opentrackio,
+    plain,
+    pose2sim,
+    ros,
+    soccernet,
+)
 from service.formats.archive import archive
 from service.formats.lens import NumberedCamera
+from service.formats.parsing import ParsedFile
+from service.formats.records import CameraRecord
 from service.schemas.names import FormatName
 from service.schemas.problems import Problem
-from service.settings import Settings
 
-JSON, ZIP = "application/json", "application/zip"
+if TYPE_CHECKING:
+    from service.settings import Settings
 
-
-def export_formats(settings: Settings) -> Mapping[FormatName, Format]:
-    """Return every format by its name."""
-    maps = partial(stmap.write, program=settings.map_program, environment=settings.native_environment)
-    return {
-        "json": AllCamerasFormat(JSON, "json", plain.write),
-        "opencv": FilePerCameraFormat("application/yaml", "yml", opencv.write),
-        "opentrackio": FilePerCameraFormat(JSON, "json", opentrackio.write),
-        "freed": AllCamerasFormat("application/octet-stream", "d1", partial(freed.write, axes=settings.freed_axes)),
-        "colmap": AllCamerasFormat(ZIP, "zip", colmap.write),
-        "soccernet": FilePerCameraFormat(JSON, "json", soccernet.write),
-        "pose2sim": AllCamerasFormat("application/toml", "toml", pose2sim.write),
-        "metropolis": AllCamerasFormat(JSON, "json", metropolis.write),
-        "st-map": OneCameraFormat(ZIP, "zip", partial(maps, origin="bottom-left")),
-        "st-map-unreal": OneCameraFormat(ZIP, "zip", partial(maps, origin="top-left")),
-    }
+JSON, YAML, TOML, ZIP = "application/json", "application/yaml", "application/toml", "application/zip"
 
 
 @dataclass(frozen=True)
@@ -44,12 +46,26 @@ class ExportedFile:
 
 
 @dataclass(frozen=True)
+class Reader:
+    """The two functions that read a format: `recognises` tells a file by its content, `read` returns the cameras."""
+
+    recognises: Callable[[ParsedFile], bool]
+    read: Callable[[Sequence[ParsedFile]], list[CameraRecord]]
+
+    @classmethod
+    def of(cls, recognises: Callable[[ParsedFile], bool], read: Callable[[ParsedFile], list[CameraRecord]]) -> Reader:
+        """Return the reader of a format each of whose files stands by itself."""
+        return cls(recognises, lambda files: [camera for file in files for camera in read(file)])
+
+
+@dataclass(frozen=True)
 class Format(ABC):
-    """A file format: its media type, the suffix of its files, and the function that writes one."""
+    """A file format: its media type, the suffix of its files, the function that writes one, and if it is read, how."""
 
     media_type: str
     suffix: str
     write: Callable[..., bytes]
+    reader: Reader | None = None
 
     @abstractmethod
     def document(self, shots: Sequence[NumberedCamera]) -> ExportedFile:
@@ -83,3 +99,36 @@ class OneCameraFormat(Format):
             ids = [shot.id for shot in shots]
             raise Problem("camera-needed", f"Say which, for instance camera={ids[0]}.", expected=ids)
         return ExportedFile(self.write(shots[0]), self.media_type, self.suffix)
+
+
+# Formats that are read and written; their lens and conventions: docs/formats.md.
+FILE_FORMATS: Mapping[FormatName, Format] = {
+    "json": AllCamerasFormat(JSON, "json", plain.write, Reader.of(plain.recognises, plain.read)),
+    "opencv": FilePerCameraFormat(YAML, "yml", opencv.write, Reader.of(opencv.recognises, opencv.read)),
+    "opentrackio": FilePerCameraFormat(
+        JSON, "json", opentrackio.write, Reader.of(opentrackio.recognises, opentrackio.read)
+    ),
+    "colmap": AllCamerasFormat(ZIP, "zip", colmap.write, Reader(colmap.recognises, colmap.read)),
+    "soccernet": FilePerCameraFormat(JSON, "json", soccernet.write, Reader.of(soccernet.recognises, soccernet.read)),
+    "pose2sim": AllCamerasFormat(TOML, "toml", pose2sim.write, Reader.of(pose2sim.recognises, pose2sim.read)),
+    "metropolis": AllCamerasFormat(JSON, "json", metropolis.write, Reader.of(metropolis.recognises, metropolis.read)),
+    "caliscope": AllCamerasFormat(TOML, "toml", caliscope.write, Reader.of(caliscope.recognises, caliscope.read)),
+    "kalibr": AllCamerasFormat(YAML, "yaml", kalibr.write, Reader.of(kalibr.recognises, kalibr.read)),
+    "ros": FilePerCameraFormat(YAML, "yaml", ros.write, Reader.of(ros.recognises, ros.read)),
+    "mrcal": FilePerCameraFormat("text/plain", "cameramodel", mrcal.write, Reader.of(mrcal.recognises, mrcal.read)),
+    "nerf": AllCamerasFormat(JSON, "json", nerf.write, Reader.of(nerf.recognises, nerf.read)),
+}
+
+
+def export_formats(settings: Settings) -> Mapping[FormatName, Format]:
+    """Return every format by its name, with those that depend on the settings and are written alone."""
+    # What runs programs takes longer to load than all that the command line needs of formats.
+    from service.formats import stmap
+
+    maps = partial(stmap.write, program=settings.map_program, environment=settings.native_environment)
+    return {
+        **FILE_FORMATS,
+        "freed": AllCamerasFormat("application/octet-stream", "d1", partial(freed.write, axes=settings.freed_axes)),
+        "st-map": OneCameraFormat(ZIP, "zip", partial(maps, origin="bottom-left")),
+        "st-map-unreal": OneCameraFormat(ZIP, "zip", partial(maps, origin="top-left")),
+    }

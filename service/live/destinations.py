@@ -154,7 +154,7 @@ class JsonLines:
     def send(self, samples: Sequence[Sample]) -> None:
         """Write a line for each camera. Raises `BrokenPipeError` if the reader has gone."""
         for sample in samples:
-            moment, camera = sample.moment, sample.shot.camera
+            moment, camera = sample.moment, sample.shot.posed
             line: dict[str, object] = {
                 "time": datetime.fromtimestamp(moment.unix_ns / 1e9, UTC).isoformat(timespec="microseconds"),
                 "number": moment.number,

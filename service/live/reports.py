@@ -20,9 +20,8 @@ import httpx
 from service.client import Client, NotUnderstood, Refused
 from service.live.destinations import Tracked
 from service.live.stored_poses import StoredPoses
-from service.schemas.geometry import Pose, PoseIn
+from service.schemas.geometry import Pose, PosedCamera, PoseIn
 from service.schemas.live import LatencyMs, LiveCameraIn, LiveReport, LiveSigma, LiveState, LiveStatus
-from service.schemas.venue import Camera
 
 INTERVAL_S = 0.5
 # Pause after a failed report.
@@ -44,7 +43,7 @@ class SentPose:
     nanoseconds.
     """
 
-    camera: Camera
+    camera: PosedCamera
     how: LiveStatus
     number: int
     taken_ns: int
@@ -124,7 +123,7 @@ class LiveReporter:
     def report(self, *, stopped: bool = False) -> LiveReport:
         """Return the current report, with all counts that were not acknowledged. `stopped`: it is the last one."""
         now = time.monotonic()
-        stored = [shot.camera for shot in self._poses.at(now)]
+        stored = [shot.posed for shot in self._poses.at(now)]
         with self._lock:
             cameras = [self._camera(camera, now) for camera in stored]
         return LiveReport(
@@ -165,7 +164,7 @@ class LiveReporter:
         taken()
         return True
 
-    def _camera(self, stored: Camera, now: float) -> LiveCameraIn:
+    def _camera(self, stored: PosedCamera, now: float) -> LiveCameraIn:
         tracked = self._tracked.get(stored.id)
         if tracked is None:
             return LiveCameraIn(id=stored.id, status="stored", pose=_pose_in(stored.pose))

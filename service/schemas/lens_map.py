@@ -112,6 +112,13 @@ def require_usable_lens(lens: Any, image_size: Sequence[int]) -> None:
         )
 
 
+def times_larger(matrix: Sequence[Sequence[float]], image_size: Sequence[int]) -> float | None:
+    """Return the ratio of the picture to the resolution that a camera matrix belongs to; None if it is this one."""
+    (_, _, cx), (_, _, cy), _ = matrix
+    width, height = image_size
+    return _times_larger(cx / width, cy / height)
+
+
 def map_of(
     model: LensModel, matrix: Sequence[Sequence[float]], distortion: Sequence[float], image_size: Sequence[int]
 ) -> LensMap:

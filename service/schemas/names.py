@@ -34,6 +34,11 @@ FormatName = Literal[
     "metropolis",
     "st-map",
     "st-map-unreal",
+    "caliscope",
+    "kalibr",
+    "ros",
+    "mrcal",
+    "nerf",
 ]
 # Detail of the entries of a list.
 ListFields = Literal["all", "summary"]

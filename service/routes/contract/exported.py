@@ -26,7 +26,8 @@ DOCUMENTS: dict[int | str, dict[str, Any]] = {
     200: {
         "content": {
             **dict.fromkeys(
-                ("application/yaml", "application/zip", "application/octet-stream", "application/toml"), BINARY
+                ("application/yaml", "application/zip", "application/octet-stream", "application/toml", "text/plain"),
+                BINARY,
             ),
             "application/json": {},
         },

@@ -11,7 +11,7 @@ import jsonschema
 import numpy as np
 import pytest
 
-from service.formats import colmap, freed, metropolis, opencv, opentrackio, plain, pose2sim, soccernet
+from service.formats import colmap, freed, metropolis, mrcal, opencv, opentrackio, plain, pose2sim, soccernet
 from service.formats.lens import NumberedCamera
 from service.schemas.problems import Problem
 from service.schemas.venue import Camera
@@ -400,10 +400,9 @@ def test_coefficients_that_are_zero_need_no_place():
 @pytest.mark.parametrize(
     "write",
     [
-        opencv.write,
         opentrackio.write,
         soccernet.write,
-        lambda one: colmap.write([one]),
+        mrcal.write,
         lambda one: pose2sim.write([one]),
         lambda one: metropolis.write([one]),
     ],

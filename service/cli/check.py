@@ -1,0 +1,157 @@
+"""`esc check`: is a calibration, whoever made it, still good on this picture? Without a venue and a service."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from service.cli.answers import print_json
+from service.cli.arguments import parse_document, parse_frame_files
+from service.cli.convert import chosen_cameras, read_calibration, write_calibration
+from service.cli.local_engine import engine_progress, engine_settings, report_job_failures
+from service.cli.printing import ACCEPTED, REJECTED, USAGE, fail, print_note, print_rows
+from service.formats.reading import CalibrationFile
+from service.formats.records import CameraRecord
+from service.intake import image_checks
+from service.schemas.check import GRADES, CameraCheck, CheckResult
+from service.schemas.field import FieldOfPlay
+
+CANNOT_TELL = 4
+EXIT_CODES = {"good": ACCEPTED, "drifted": REJECTED, "wrong": REJECTED, "cannot-tell": CANNOT_TELL}
+
+
+def check(
+    arguments: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="FILE... CAMERA=FRAME...",
+            help="A calibration of any format that `esc convert` reads, and a JPEG or PNG of each camera to check.",
+        ),
+    ],
+    sport: Annotated[str | None, typer.Option("--sport", help="Sport of the field: football, tennis ...")] = None,
+    size: Annotated[
+        str | None,
+        typer.Option("--field", metavar="LENGTHxWIDTH", help="Size of the field, m; otherwise the sport's usual one."),
+    ] = None,
+    site: Annotated[
+        Path | None,
+        typer.Option(
+            "--site",
+            exists=True,
+            dir_okay=False,
+            help="In place of --sport: the JSON file of a venue, for its field; that of a venue to check has one.",
+        ),
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="File or folder for the corrected calibration, in the same format."),
+    ] = None,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Any number: the same one finds the same.")] = 0,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON in place of a table.")] = False,
+) -> None:
+    """Check a calibration of any tool by frames. Exit: 0 good, 1 failed, 2 usage, 3 drifted or wrong, 4 cannot tell.
+
+    The file is read in the convention of its format; if that does not fit, others are tried and the one that does is
+    named. `-o` writes the cameras as the frames show them, in metres from the centre of the field.
+    """
+    settings = engine_settings()
+    frames = [argument for argument in arguments if "=" in argument and not Path(argument).exists()]
+    files = {camera: [path.read_bytes() for path in paths] for camera, paths in parse_frame_files(frames).items()}
+    paths = [Path(argument) for argument in arguments if argument not in frames]
+    if not paths or not files:
+        fail("Give the files of a calibration, and a frame of each camera to check, such as left=left.jpg", USAGE)
+    if missing := [path for path in paths if not path.exists()]:
+        fail(f"There is no file {', '.join(map(str, missing))}", USAGE)
+    field = _parse_field(sport, size, site or paths[0])
+    found = read_calibration(paths)
+    cameras = _cameras_with_frames(found, list(files))
+    with report_job_failures():
+        for name, images in files.items():
+            for data in images:
+                image_checks.check_photo(name, data, settings)
+    from worker.compute_resources import ComputeResources
+    from worker.jobs import check as checking
+
+    inputs = [checking.CheckedInput(one.id, one.intrinsics, one.size, one.pose) for one in cameras]
+    with engine_progress() as show:
+        checks = checking.solve(field, inputs, files, seed, ComputeResources.of(settings), show)
+    worst = next(grade for grade in GRADES if any(one.grade == grade for one in checks))
+    result = CheckResult(grade=worst, format=found.format, field=field, cameras=checks)
+    if as_json:
+        print_json(result)
+    else:
+        _print_table(checks)
+    if output is not None:
+        _write_corrected(found, cameras, checks, output)
+    raise typer.Exit(EXIT_CODES[worst])
+
+
+def _parse_field(sport: str | None, size: str | None, site: Path) -> FieldOfPlay:
+    """Return the field of a sport, or of a file with a field."""
+    if sport is None:
+        described = _field_of(site)
+        if described is None or size is not None:
+            fail("Say the sport of the field: --sport football, or --site with a venue's file", USAGE)
+        return parse_document(FieldOfPlay, json.dumps(described), f"{site}, field")
+    field: dict[str, Any] = {"template": sport}
+    if size is not None:
+        match = re.fullmatch(r"(\d+(?:\.\d+)?)[x×](\d+(?:\.\d+)?)", size)
+        if match is None:
+            fail(f"--field {size}: expected LENGTHxWIDTH in metres, for instance 105x68", USAGE)
+        field |= {"length_m": float(match[1]), "width_m": float(match[2])}
+    return parse_document(FieldOfPlay, json.dumps(field), "--sport")
+
+
+def _field_of(site: Path) -> Any:
+    """Return the field in a venue's file; None where there is none."""
+    try:
+        document = json.loads(site.read_bytes()) if site.is_file() else None
+    except ValueError:
+        return None
+    return document.get("field") if isinstance(document, dict) else None
+
+
+def _cameras_with_frames(found: CalibrationFile, named: Sequence[str]) -> list[CameraRecord]:
+    """Return the cameras that frames are given of; the only camera of a file has any name."""
+    if len(found.cameras) == 1 and len(named) == 1:
+        return [replace(found.cameras[0], id=named[0])]
+    return chosen_cameras(found, list(named))
+
+
+def _print_table(checks: Sequence[CameraCheck]) -> None:
+    rows = [
+        [one.id, one.grade.replace("-", " "), _within(one.off_px, one.sigma_px, 1), _within(one.off_m, one.sigma_m, 2)]
+        + ["; ".join(cause.detail for cause in one.causes) or one.detail or "-"]
+        for one in checks
+    ]
+    print_rows(["CAMERA", "GRADE", "OFF, PX", "OFF, M ON THE GROUND", "CAUSE"], rows)
+
+
+def _within(value: float | None, sigma: float | None, digits: int) -> str:
+    if value is None:
+        return "-"
+    return f"{value:.{digits}f}" + ("" if sigma is None else f" ± {sigma:.{digits}f}")
+
+
+def _write_corrected(
+    found: CalibrationFile, cameras: Sequence[CameraRecord], checks: Sequence[CameraCheck], output: Path
+) -> None:
+    """Write the cameras of a file as the frames show them; those that could not be checked as they were."""
+    corrected = {
+        camera.id: CameraRecord(camera.id, one.intrinsics, (one.image_size[0], one.image_size[1]), one.pose)
+        for camera, one in zip(cameras, checks, strict=True)
+        if one.intrinsics is not None
+    }
+    if not corrected:
+        print_note(f"Nothing was found to correct; {output} is not written.")
+        return
+    kept = [one for one in cameras if one.id in corrected]
+    if left_out := [one.id for one in found.cameras if one.id not in corrected]:
+        print_note(f"Not in {output}: {', '.join(left_out)}, of which the frames do not tell enough.")
+    write_calibration([corrected[one.id] for one in kept], found.format, output)

@@ -1,0 +1,94 @@
+"""`esc check` by its function, on a rendered pair: grade, cause, exit code, and the corrected file."""
+
+import json
+import math
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+import typer
+
+from service.cli.check import check
+from service.formats.conversion import members_of, write_cameras
+from service.formats.reading import read_paths
+from service.formats.records import CameraRecord
+from service.schemas.geometry import Intrinsics, Pose
+from testbed import rendered_pair
+from testbed.spoiling import darkened
+
+pytestmark = pytest.mark.slow
+
+
+def records():
+    """The true cameras of the pair."""
+    return [
+        CameraRecord(
+            one.id,
+            Intrinsics(matrix=one.intrinsics.matrix.tolist(), distortion=one.intrinsics.distortion.tolist()),
+            one.intrinsics.size,
+            Pose.from_position(one.pose.rotation.tolist(), one.pose.position.tolist()),
+        )
+        for one in rendered_pair.cameras()
+    ]
+
+
+@pytest.fixture(scope="module")
+def frames(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("frames")
+    for name, frame in rendered_pair.frames().items():
+        (folder / f"{name}.jpg").write_bytes(frame)
+    field = {"template": "football", "line_width_m": 0.12, "ridge": rendered_pair.PITCH.ridge.tolist()}
+    (folder / "site.json").write_text(json.dumps({"id": "pair", "field": field}))
+    return folder
+
+
+def run(tmp_path, frames, cameras, form, capsys, **options):
+    """Write cameras in a format, check them, and return exit code, answer and standard error."""
+    folder = tmp_path / "given"
+    folder.mkdir()
+    for name, content in members_of(write_cameras(cameras, form), cameras[0].id).items():
+        (folder / name).write_bytes(content)
+    ids = [one.id for one in read_paths([folder]).cameras]
+    named = [f"{id}={frames}/{one.id}.jpg" for id, one in zip(ids, cameras, strict=True)]
+    with pytest.raises(typer.Exit) as ended:
+        check([str(folder), *named], site=frames / "site.json", as_json=True, **options)
+    printed = capsys.readouterr()
+    return ended.value.exit_code, json.loads(printed.out), printed.err
+
+
+def test_true_cameras_are_good(tmp_path, frames, capsys):
+    code, answer, _ = run(tmp_path, frames, records(), "colmap", capsys)
+    assert (code, answer["grade"], answer["format"]) == (0, "good", "colmap")
+    assert all(one["off_px"] < 2 and one["causes"] == [] for one in answer["cameras"])
+
+
+def test_centimetres_and_a_turn_are_told_and_corrected(tmp_path, frames, capsys):
+    turned = [one.pose.rotation[0] + math.radians(0.6) for one in records()]
+    cameras = [
+        replace(
+            one,
+            pose=Pose.from_position([tilt, *one.pose.rotation[1:]], [100 * metres for metres in one.pose.position]),
+        )
+        for one, tilt in zip(records(), turned, strict=True)
+    ]
+    output = tmp_path / "corrected.toml"
+    code, answer, _ = run(tmp_path, frames, cameras, "pose2sim", capsys, output=output)
+    assert (code, answer["grade"]) == (3, "wrong")
+    assert [[cause["cause"] for cause in one["causes"]] for one in answer["cameras"]] == [["centimetres", "turned"]] * 2
+    corrected = read_paths([output])
+    assert corrected.format == "pose2sim"
+    for found, true in zip(corrected.cameras, records(), strict=True):
+        assert math.dist(found.pose.position, true.pose.position) < 0.2
+
+
+def test_a_frame_in_the_dark_tells_nothing(tmp_path, frames, capsys):
+    dark = tmp_path / "dark"
+    dark.mkdir()
+    (dark / "site.json").write_bytes((frames / "site.json").read_bytes())
+    for name in ("left", "right"):
+        frame = cv2.imread(str(frames / f"{name}.jpg"))
+        cv2.imwrite(str(dark / f"{name}.jpg"), darkened(frame))
+    code, answer, _ = run(tmp_path, dark, records(), "mrcal", capsys)
+    assert (code, answer["grade"]) == (4, "cannot-tell")
+    assert all(np.isfinite(one["off_px"] or 0) and one["detail"] for one in answer["cameras"])

@@ -1,0 +1,274 @@
+"""The engine's third page: cameras as a file of any origin has them, and frames, in; how good each is, and why, out.
+
+First the file is taken at its word: the cameras are calibrated from where it puts them, as a job does. For those that
+are not found there, in this order, the first that the gate accepts: the poses in another convention and the lens at
+another resolution, the camera turned where it stands, zoomed where it stands, anywhere, or with another lens.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from worker.calibration.calibrate import calibrate
+from worker.calibration.checking.ranking import films_the_field, rank_readings
+from worker.calibration.checking.readings import Reading
+from worker.calibration.detection.segmentation import whole_frame
+from worker.calibration.diagnostics.registration import Response
+from worker.calibration.find_cameras import find_cameras
+from worker.calibration.gate.quality import CameraResult
+from worker.calibration.geometry.camera import Camera, Frame
+from worker.calibration.geometry.field import Field
+from worker.calibration.geometry.lens import Lens
+from worker.calibration.geometry.plausible_pose import films_a_field
+from worker.calibration.records import CalibrationError, Options, Progress, ProgressReporter, Recover, Segment
+from worker.calibration.relocalisation.line_view import LineView
+from worker.calibration.relocalisation.paint import Paint
+from worker.calibration.relocalisation.sought import (
+    ANYWHERE,
+    KNOCKED_ROLL_DEG,
+    Place,
+    SoughtCamera,
+    SoughtLens,
+    unknown_lenses,
+)
+
+Search = Literal["zoomed", "anywhere", "lens"]
+TAKEN_AT_ITS_WORD = Reading((), 1.0, np.eye(3), np.eye(3), (0, 0))
+CALIBRATED = 3
+"""Readings that are calibrated from, of those that are likelier than the file at its word."""
+READINGS_AT, SEARCH_AT = 0.1, 0.4
+"""Shares of the whole at which readings and searches begin, if they do: by the core-seconds of a zoomed pair."""
+ZOOM_UNCERTAIN = 0.25
+"""Relative sigma of a focal length that somebody may have zoomed."""
+ON_ITS_MOUNT_M = 2.5
+OF_THE_FRAME = frozenset({"dark", "fogged", "blinded", "snow", "out-of-focus"})
+"""Causes for which a frame shows nothing by any pose. That of a blocked view may be the ground that a wrong pose takes
+for the field."""
+LEAST_PAINT, MOST_EXPLAINED = 200, 0.15
+"""Lines are clearly seen, and a calibration clearly explains none of them: as `recovery` has it."""
+
+
+@dataclass(frozen=True)
+class CheckedCamera:
+    """Camera of a file beside the camera that its frame shows.
+
+    `given`: as the file has it, its lens for the frame's size; `reading`: the convention in which it fits; `meant`: the
+    camera of that reading; `found`: as it was calibrated, None if it was not; `refusal`: why it was not; `is_resized`:
+    True if the lens was for pictures of another resolution; `searched`: the search that found it, None if it stands
+    where the file puts it; `explained`: share of the paint in the frame, 0..1, on the markings as the file puts them,
+    None where little paint is seen.
+    """
+
+    given: Camera
+    has_pose: bool
+    reading: Reading
+    meant: Camera
+    found: CameraResult | None
+    refusal: str | None
+    is_resized: bool = False
+    searched: Search | None = None
+    explained: float | None = None
+
+    @property
+    def is_clearly_wrong(self) -> bool:
+        """True if lines are clearly seen, and none of them where the file puts them."""
+        return self.explained is not None and self.explained <= MOST_EXPLAINED
+
+
+@dataclass(frozen=True)
+class GivenCamera:
+    """Camera as a file has it: `camera` with its lens for frames of their size.
+
+    `is_resized`: True if the file has the lens for pictures of another size; `resized`: the lens, if its numbers look
+    like those of another resolution than the file says; `has_pose`: False for a lens alone, whose pose says nothing.
+    """
+
+    camera: Camera
+    is_resized: bool = False
+    resized: Lens | None = None
+    has_pose: bool = True
+
+
+def check_cameras(
+    pitch: Field,
+    given: Sequence[GivenCamera],
+    frames: Mapping[str, Sequence[Frame]],
+    segment: Segment,
+    seed: int = 0,
+    report: Callable[[Progress], None] = lambda _: None,
+) -> list[CheckedCamera]:
+    """Return for each camera of a file how its frames `frames[camera.id]` show it. Deterministic for a `seed`."""
+    progress = ProgressReporter(report, lambda: False)
+    checker = _Checker(pitch, {one.camera.id: one for one in given}, frames, segment, seed)
+    progress.at_fraction("refinement", 0.0)
+    checker.calibrate_as(TAKEN_AT_ITS_WORD, resized=False)
+    progress.at_fraction("segmentation", READINGS_AT)
+    for reading, resized in checker.likeliest_readings():
+        checker.calibrate_as(reading, resized=resized)
+    progress.at_fraction("evolution", SEARCH_AT)
+    checker.calibrate_turned()
+    checker.search()
+    return [checker.result(one.camera.id) for one in given]
+
+
+@dataclass
+class _Checker:
+    """Course of a check: the cameras that are `settled`, and why the others are not (`refusals`)."""
+
+    pitch: Field
+    given: Mapping[str, GivenCamera]
+    frames: Mapping[str, Sequence[Frame]]
+    segment: Segment
+    seed: int
+    settled: dict[str, CheckedCamera] = field(default_factory=dict)
+    refusals: dict[str, str] = field(default_factory=dict)
+    unusable: set[str] = field(default_factory=set)
+    _responses: dict[str, Response] = field(default_factory=dict)
+
+    @property
+    def open(self) -> list[GivenCamera]:
+        """Cameras that are not settled and whose frames can be used."""
+        return [one for id, one in self.given.items() if id not in self.settled and id not in self.unusable]
+
+    def calibrate_as(self, reading: Reading, *, resized: bool) -> None:
+        """Calibrate the open cameras from where a reading of the file puts them, and settle those that are accepted."""
+        meant = {one.camera.id: self._meant(one, reading, resized) for one in self.open if one.has_pose}
+        filming = [camera for camera in meant.values() if films_the_field(self.pitch, camera)]
+        for result in self._calibrated(filming, "never"):
+            id = result.camera.id
+            if result.accepted:
+                self._settle(id, reading, meant[id], result, resized=resized)
+            elif not result.view.usable and result.view.cause in OF_THE_FRAME:
+                self.unusable.add(id)
+
+    def calibrate_turned(self) -> None:
+        """Calibrate the open cameras where they stand, whatever way they look."""
+        cameras = [one.camera for one in self.open if one.has_pose and films_the_field(self.pitch, one.camera)]
+        for result in self._calibrated(cameras, "accept"):
+            if result.accepted:
+                self._settle(result.camera.id, TAKEN_AT_ITS_WORD, self.given[result.camera.id].camera, result)
+
+    def search(self) -> None:
+        """Search for the open cameras: zoomed where they stand, anywhere, and through another lens."""
+        ways: dict[Search, Callable[[GivenCamera], SoughtCamera | None]] = {
+            "zoomed": self._zoomed,
+            "anywhere": self._anywhere,
+            "lens": self._through_another_lens,
+        }
+        for way, tried in ways.items():
+            sought = [one for one in (tried(given) for given in self.open) if one is not None]
+            if not sought:
+                continue
+            frames = {one.id: self.frames[one.id] for one in sought}
+            searched = find_cameras(self.pitch, sought, [], frames, self.segment, self.seed)
+            found = [one.candidates[0].camera for one in searched.cameras if one.accepted]
+            for result in self._calibrated(found, "never"):
+                if result.accepted:
+                    given = self.given[result.camera.id].camera
+                    self._settle(given.id, TAKEN_AT_ITS_WORD, given, result, searched=way)
+
+    def result(self, id: str) -> CheckedCamera:
+        """Return the answer for a camera."""
+        if id in self.settled:
+            return self.settled[id]
+        given = self.given[id]
+        explained = None
+        if id not in self.unusable:
+            paint = Paint.of(np.rint(self._response(given) * 255).astype(np.uint8))
+            if len(paint.middles) >= LEAST_PAINT:
+                explained = paint.explained_by(self.pitch, given.camera) if given.has_pose else None
+        return CheckedCamera(
+            given.camera,
+            given.has_pose,
+            TAKEN_AT_ITS_WORD,
+            given.camera,
+            None,
+            self.refusals.get(id),
+            given.is_resized,
+            explained=explained,
+        )
+
+    def likeliest_readings(self) -> Iterator[tuple[Reading, bool]]:
+        """Yield the readings, and whether with resized lenses, by which the open cameras are calibrated next."""
+        for resized in (False, True):
+            cameras = [one for one in self.open if one.has_pose and (one.resized is not None or not resized)]
+            if not cameras:
+                continue
+            meant = [self._meant(one, TAKEN_AT_ITS_WORD, resized) for one in cameras]
+            ranked = rank_readings(self.pitch, meant, [self._view(one, resized) for one in cameras], self.seed)
+            # At its word the file was tried already, but not with a resized lens.
+            for reading in [one for one in ranked if resized or one.causes][:CALIBRATED]:
+                if self.open:
+                    yield reading, resized
+
+    def _view(self, given: GivenCamera, resized: bool) -> LineView:
+        response = np.rint(self._response(given) * 255).astype(np.uint8)
+        return LineView.of(response, self._lens(given, resized), KNOCKED_ROLL_DEG)
+
+    def _response(self, given: GivenCamera) -> Response:
+        """Return the network's response (H, W), 0..1, to the first frame of a camera."""
+        id = given.camera.id
+        if id not in self._responses:
+            seen = self.segment(self.frames[id][0], whole_frame(given.camera.intrinsics.size))
+            self._responses[id] = (seen / np.float32(255)).astype(np.float32)
+        return self._responses[id]
+
+    def _calibrated(self, cameras: Sequence[Camera], recover: Recover) -> Sequence[CameraResult]:
+        if not cameras:
+            return []
+        options = Options(seed=self.seed, recover=recover, lens_may_drift=True)
+        try:
+            found = calibrate(
+                self.pitch, cameras, {one.id: self.frames[one.id] for one in cameras}, self.segment, options
+            )
+        except CalibrationError as error:
+            self.refusals.setdefault(error.camera, error.detail)
+            return []
+        for result in found.cameras:
+            if result.rejected_because is not None:
+                self.refusals.setdefault(result.camera.id, result.rejected_because)
+        return found.cameras
+
+    def _settle(
+        self,
+        id: str,
+        reading: Reading,
+        meant: Camera,
+        found: CameraResult,
+        *,
+        resized: bool = False,
+        searched: Search | None = None,
+    ) -> None:
+        given = self.given[id]
+        is_resized = given.is_resized or (resized and given.resized is not None)
+        self.settled[id] = CheckedCamera(
+            given.camera, given.has_pose, reading, meant, found, None, is_resized, searched
+        )
+
+    def _lens(self, given: GivenCamera, resized: bool) -> Lens:
+        return given.resized if resized and given.resized is not None else given.camera.intrinsics
+
+    def _meant(self, given: GivenCamera, reading: Reading, resized: bool) -> Camera:
+        half_sides = np.array([self.pitch.length, self.pitch.width]) / 2
+        camera = given.camera.with_lens(self._lens(given, resized))
+        return camera.with_pose(reading.pose(camera.pose, half_sides))
+
+    def _zoomed(self, given: GivenCamera) -> SoughtCamera | None:
+        if not given.has_pose or not films_a_field(given.camera.pose):
+            return None
+        lens = SoughtLens.around(given.camera.intrinsics, ZOOM_UNCERTAIN)
+        place = Place(position=given.camera.pose.position, radius_m=ON_ITS_MOUNT_M)
+        return SoughtCamera(given.camera.id, [lens], place, roll_sigma_deg=KNOCKED_ROLL_DEG)
+
+    def _anywhere(self, given: GivenCamera) -> SoughtCamera:
+        return SoughtCamera(given.camera.id, [SoughtLens.known(given.camera.intrinsics)], ANYWHERE)
+
+    def _through_another_lens(self, given: GivenCamera) -> SoughtCamera | None:
+        if not given.has_pose or not films_a_field(given.camera.pose):
+            return None
+        place = Place(position=given.camera.pose.position, radius_m=ON_ITS_MOUNT_M)
+        return SoughtCamera(given.camera.id, unknown_lenses(given.camera.intrinsics.size), place)

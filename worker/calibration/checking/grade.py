@@ -1,0 +1,126 @@
+"""Grade of a checked camera: good, drifted, wrong or cannot tell; how far off it is, and the causes in words."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from worker.calibration.checking.check import CheckedCamera
+from worker.calibration.checking.readings import Cause
+from worker.calibration.detection.evidence import TOLERANCE_PX
+from worker.calibration.gate.displacement import measure_displacement
+from worker.calibration.gate.quality import CameraResult, Moved
+from worker.calibration.geometry.camera import Array, Camera, Pose
+from worker.calibration.geometry.field import Field
+
+Grade = Literal["good", "drifted", "wrong", "cannot-tell"]
+Change = Literal["turned", "moved", "zoomed", "other-lens", "other-place"]
+CauseOfGrade = Cause | Change | Literal["other-resolution", "folds", "unexplained", "no-pose"]
+SIGMAS = 3.0
+"""Standard deviations from which a difference is none of chance."""
+
+
+@dataclass(frozen=True)
+class Difference:
+    """Difference of a calibration from what the frame shows, with one standard deviation of it.
+
+    `pixels`: mean shift of the markings in view; `metres`: of the farthest marking in view, on the ground; None where
+    the lines do not tell.
+    """
+
+    pixels: float
+    sigma_pixels: float | None
+    metres: float | None
+    sigma_metres: float | None
+
+
+@dataclass(frozen=True)
+class GradedCamera:
+    """A checked camera with its grade, its causes (name and words), and its difference from the frame, if known."""
+
+    checked: CheckedCamera
+    grade: Grade
+    causes: list[tuple[CauseOfGrade, str]]
+    difference: Difference | None
+
+
+def grade(pitch: Field, checked: CheckedCamera, lens_folds: str | None) -> GradedCamera:
+    """Return the grade of a camera; `lens_folds`: words about a lens that has no rays for a part of the picture.
+
+    A lens that folds where no marking is, in a corner of the sky, does no harm.
+    """
+    folds: list[tuple[CauseOfGrade, str]] = [] if lens_folds is None else [("folds", lens_folds)]
+    found = checked.found
+    if found is None:
+        return _not_found(checked, folds)
+    if not checked.has_pose:
+        said: list[tuple[CauseOfGrade, str]] = [("no-pose", "the file has a lens and no pose; one was found")]
+        return GradedCamera(checked, "cannot-tell", [*folds, *said], None)
+    difference = _difference(pitch, checked.meant, found)
+    tolerance = max(good_within_px(checked.meant), SIGMAS * (difference.sigma_pixels or 0.0))
+    written: list[tuple[CauseOfGrade, str]] = [*zip(checked.reading.causes, checked.reading.words, strict=True)]
+    if checked.is_resized:
+        written.append(("other-resolution", "its lens is for pictures of another resolution"))
+    since: list[tuple[CauseOfGrade, str]] = []
+    if difference.pixels > tolerance:
+        written += folds
+        since += _changes(pitch, checked, found, tolerance)
+    if written or any(cause in ("other-place", "other-lens") for cause, _ in since):
+        return GradedCamera(checked, "wrong", [*written, *since], difference)
+    return GradedCamera(checked, "drifted" if since else "good", since, difference)
+
+
+def good_within_px(camera: Camera) -> float:
+    """Return the mean shift of the markings up to which a calibration is good: a line counts as found so far off."""
+    return max(TOLERANCE_PX * camera.intrinsics.relative_size, 2.0)
+
+
+def _not_found(checked: CheckedCamera, folds: list[tuple[CauseOfGrade, str]]) -> GradedCamera:
+    if not checked.is_clearly_wrong:
+        return GradedCamera(checked, "cannot-tell", folds, None)
+    why = f"lines are clearly seen, {checked.explained:.0%} of them where it puts markings, and no reading of it fits"
+    return GradedCamera(checked, "wrong", [*folds, ("unexplained", why)], None)
+
+
+def _difference(pitch: Field, meant: Camera, found: CameraResult) -> Difference:
+    ground = measure_displacement(pitch, meant, found)
+    sigma = None if found.ground_sigma is None else float(np.sqrt(np.mean(found.ground_sigma.pixels**2)))
+    return Difference(
+        Moved.between(pitch, meant, found.camera).pixels,
+        sigma,
+        None if ground is None else float(np.hypot(*ground.shift)),
+        None if ground is None else float(np.hypot(*ground.sigma)),
+    )
+
+
+def _changes(
+    pitch: Field, checked: CheckedCamera, found: CameraResult, tolerance_px: float
+) -> list[tuple[CauseOfGrade, str]]:
+    """Return what happened to a camera since, or what else is wrong: each that alone moves the markings in view.
+
+    Where none does so alone, the one that moves them most.
+    """
+    meant, now = checked.meant, found.camera
+    moved = Moved.between(pitch, meant, now)
+    if checked.searched == "anywhere" and moved.exceeds_limits:
+        x, y, z = now.pose.position
+        where = f"({x:.1f}, {y:.1f}, {z:.1f}) m"
+        return [("other-place", f"the camera stands at {where}, and no reading of the file says so")]
+    longer = now.intrinsics.focal_length_px / meant.intrinsics.focal_length_px - 1
+    lens = f"its focal length is {abs(longer):.1%} {'longer' if longer > 0 else 'shorter'}"
+    zoom: tuple[CauseOfGrade, str] = ("zoomed", f"zoomed: {lens}")
+    if checked.searched == "lens":
+        zoom = "other-lens", f"another lens fits the lines: {lens}"
+    alone: list[tuple[Camera, tuple[CauseOfGrade, str]]] = [
+        (meant.with_lens(now.intrinsics), zoom),
+        (_posed(meant, now.pose.rotation, meant.pose.position), ("turned", f"turned by {moved.rotation_deg:.2f}°")),
+        (_posed(meant, meant.pose.rotation, now.pose.position), ("moved", f"moved by {moved.position_m:.2f} m")),
+    ]
+    shifts = [(Moved.between(pitch, meant, changed).pixels, said) for changed, said in alone]
+    return [said for pixels, said in shifts if pixels > tolerance_px] or [max(shifts, key=lambda one: one[0])[1]]
+
+
+def _posed(camera: Camera, rotation: Array, position: Array) -> Camera:
+    return camera.with_pose(Pose(rotation, position))

@@ -1,0 +1,116 @@
+"""Check of a calibration of any origin by frames of its cameras."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+
+from service.schemas.check import CameraCheck, CheckCause
+from service.schemas.field import FieldOfPlay
+from service.schemas.frame_sizes import is_resized, other_shape
+from service.schemas.geometry import Intrinsics, Pose
+from service.schemas.lens_map import LEAST_BLIND_SHARE, map_of, times_larger
+from worker.calibration.checking.check import GivenCamera, check_cameras
+from worker.calibration.checking.grade import GradedCamera, grade
+from worker.calibration.geometry import camera as engine
+from worker.calibration.geometry.lens import Lens
+from worker.compute_resources import ComputeResources
+from worker.jobs.decoding import decode_frame, decode_frame_of_any_size
+from worker.jobs.documents import Progress
+from worker.jobs.from_schemas import JobFailedError, Picture, lens_of, pitch_of
+from worker.jobs.to_schemas import engine_failures, lens_to_schema, load_segmenter, pose_to_schema, progress_to_schema
+
+
+@dataclass(frozen=True)
+class CheckedInput:
+    """A camera of a file: its lens, and its size (width, height) and pose where the file has them."""
+
+    id: str
+    intrinsics: Intrinsics
+    size: tuple[int, int] | None
+    pose: Pose | None
+
+
+def solve(
+    field: FieldOfPlay,
+    cameras: Sequence[CheckedInput],
+    files: Mapping[str, Sequence[bytes]],
+    seed: int,
+    means: ComputeResources,
+    report: Callable[[Progress], None],
+) -> list[CameraCheck]:
+    """Return the grade of each camera by the files of its frames. Raises `JobFailedError` for frames of no use."""
+    segmenter = load_segmenter(means)
+    cv2.setNumThreads(means.threads)
+    frames = {camera.id: _decode(camera.id, files[camera.id]) for camera in cameras}
+    given = [_given(camera, _size(frames[camera.id][0])) for camera in cameras]
+    pitch = pitch_of(field)
+    with engine_failures():
+        checked = check_cameras(pitch, given, frames, segmenter, seed, lambda step: report(progress_to_schema(step)))
+    return [_to_schema(grade(pitch, one, _folds(one.meant.intrinsics))) for one in checked]
+
+
+def _decode(camera: str, files: Sequence[bytes]) -> list[Picture]:
+    """Return the frames of a camera, all of the size of the first."""
+    first = decode_frame_of_any_size(camera, files[0])
+    return [first, *(decode_frame(camera, first.shape[1::-1], file) for file in files[1:])]
+
+
+def _size(frame: Picture) -> tuple[int, int]:
+    height, width = frame.shape[:2]
+    return width, height
+
+
+def _given(camera: CheckedInput, size: tuple[int, int]) -> GivenCamera:
+    """Return a camera with its lens for frames of a size."""
+    written_for = camera.size or size
+    if not is_resized(size, written_for):
+        raise JobFailedError("frame-size", other_shape(camera.id, size, written_for), camera.id)
+    lens = lens_of(camera.intrinsics, [*written_for])
+    if written_for != size:
+        lens = replace(lens.scaled(size[0] / written_for[0]), size=size)
+    larger = times_larger(camera.intrinsics.matrix, written_for)
+    resized = None if larger is None else replace(lens.scaled(larger), size=size)
+    pose = NO_POSE if camera.pose is None else _pose(camera.pose)
+    return GivenCamera(
+        engine.Camera(camera.id, lens, pose), written_for != size, resized, has_pose=camera.pose is not None
+    )
+
+
+NO_POSE = engine.Pose(np.zeros(3), np.zeros(3))
+
+
+def _pose(pose: Pose) -> engine.Pose:
+    return engine.Pose(np.array(pose.rotation), np.array(pose.position))
+
+
+def _folds(lens: Lens) -> str | None:
+    """Return words about a lens without rays for a part of its picture; None for a good one."""
+    seen = map_of(lens.model, lens.matrix.tolist(), lens.distortion.tolist(), lens.size)
+    if seen.blind_share < LEAST_BLIND_SHARE:
+        return None
+    return (
+        f"its distortion folds {seen.radius_px:.0f} px from the middle: {max(seen.blind_share, 0.01):.0%} of the "
+        "picture has no ray"
+    )
+
+
+def _to_schema(graded: GradedCamera) -> CameraCheck:
+    checked, difference = graded.checked, graded.difference
+    found = checked.found
+    return CameraCheck(
+        id=checked.given.id,
+        grade=graded.grade,
+        causes=[CheckCause(cause=cause, detail=detail) for cause, detail in graded.causes],
+        off_px=None if difference is None else difference.pixels,
+        sigma_px=None if difference is None else difference.sigma_pixels,
+        off_m=None if difference is None else difference.metres,
+        sigma_m=None if difference is None else difference.sigma_metres,
+        detail=checked.refusal,
+        image_size=[*checked.given.intrinsics.size],
+        pose=None if found is None else pose_to_schema(found.camera.pose),
+        intrinsics=None if found is None else lens_to_schema(found.camera.intrinsics),
+    )
