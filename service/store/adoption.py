@@ -27,21 +27,10 @@ from service.store.jobs.queries import FoundSite, found_poses, found_site
 from service.store.memories import newest_memories
 from service.store.preconditions import UNCONDITIONAL, Precondition
 from service.store.refusals import camera_of, no_refined_pose, no_refined_since, venue_moved_on
-from service.store.revisions import (
-    CALIBRATION_CAUSES,
-    FIELD_NUMBERS,
-    newest_revision,
-    revision_of_job,
-    state_at,
-)
+from service.store.revisions import CALIBRATION_CAUSES, FIELD_NUMBERS, newest_revision, revision_of_job, state_at
 from service.store.venue_fold import with_result, with_revision, with_venue
 from service.store.venue_state import load, write_changes
-from service.store.venues import (
-    changing_venue,
-    find_readable,
-    find_stored,
-    store_venue,
-)
+from service.store.venues import changing_venue, find_readable, find_stored, store_venue
 
 # Newest revisions in which the accepted pose of a camera is looked for: others may have been accepted without it since.
 SEARCHED_REVISIONS = 20

@@ -34,14 +34,7 @@ from service.store.revisions import FIELD_NUMBERS, PLACED_CAUSES
 from service.store.statistics.venue_quality import IN_CURVE, CalibrationSummary, CameraHistory
 from service.store.trend_charts import chart_columns, no_chart_columns
 from service.store.unreadable import MOST_FAULTS
-from service.store.venue_state import (
-    AnchorRow,
-    Changes,
-    NightRow,
-    RevisionRow,
-    StoredVenue,
-    VenueState,
-)
+from service.store.venue_state import AnchorRow, Changes, NightRow, RevisionRow, StoredVenue, VenueState
 
 # The nights of each camera that are kept: three years of them.
 KEPT_NIGHTS = 1100
@@ -138,11 +131,8 @@ def _with_accepted(changes: Changes, result: Result, cameras: Collection[str]) -
         for camera in cameras
     }
     knocked = {camera: why for camera, why in (changes.knocked or {}).items() if camera not in cameras}
-    cameras_now = {**quality.cameras, **histories}
-    return replace(
-        changes.with_quality(cameras=cameras_now, accepted_at=now, rejected_in_a_row=0),
-        knocked=knocked,
-    )
+    changes = changes.with_quality(cameras={**quality.cameras, **histories}, accepted_at=now, rejected_in_a_row=0)
+    return replace(changes, knocked=knocked)
 
 
 def _largest_movement_px(result: Result) -> float | None:

@@ -15,8 +15,8 @@ import sqlalchemy as sa
 from service.schemas.actor import Actor
 from service.schemas.base import Unreadable
 from service.schemas.field import FieldOfPlay
-from service.schemas.health import VenueHealth
-from service.schemas.history import Cause, Revision
+from service.schemas.health import CameraHealth, VenueHealth
+from service.schemas.history import Cause, Revision, RevisionCamera
 from service.schemas.names import OPEN_STATUSES
 from service.schemas.source_urls import SourceSecrets
 from service.schemas.venue import Venue
@@ -26,12 +26,7 @@ from service.store.credentials import merge_credentials, read_credentials, write
 from service.store.database import Repository, clock, lock_venue, reading, writing
 from service.store.documents import stored_venue
 from service.store.events.event_log import add_event, venue_event
-from service.store.health import health_of
-from service.store.memories import (
-    memories_at,
-    newest_memories,
-    revisions_with_memories,
-)
+from service.store.memories import memories_at, newest_memories, revisions_with_memories
 from service.store.preconditions import UNCONDITIONAL, Precondition
 from service.store.refusals import no_such_venue, venue_busy
 from service.store.revisions import (
@@ -43,10 +38,11 @@ from service.store.revisions import (
     revisions_that_fit,
     state_at,
 )
-from service.store.schedules import plan_schedule
+from service.store.schedules import plan_schedule, schedule_of
+from service.store.statistics.venue_quality import CameraHistory, QualityRow, read_quality
 from service.store.unreadable import UnreadableRow, read_each
 from service.store.venue_fold import with_revision_restored, with_venue_put
-from service.store.venue_state import StoredVenue, load, read_venue, write_changes
+from service.store.venue_state import StoredVenue, active_alarms, load, read_venue, write_changes
 
 v = tables.venues.c
 # Tables whose rows are deleted with their venue.
@@ -203,7 +199,7 @@ class VenueRepository(Repository):
     def health(self, venue_id: str) -> VenueHealth | None:
         """Return the health of a venue, None if there is none."""
         with reading(self._engine) as connection:
-            return health_of(connection, venue_id)
+            return _health_of(connection, venue_id)
 
     def delete(self, venue_id: str, precondition: Precondition = UNCONDITIONAL, by: Actor | None = None) -> None:
         """Delete a venue, readable or not, with its history; raises the problem `venue-busy` if a job of it is open."""
@@ -260,6 +256,29 @@ class VenueRepository(Repository):
         with reading(self._engine) as connection:
             newest = newest_revision(connection, venue_id)
             return None if newest is None else (newest, origin_of(connection, venue_id, newest))
+
+
+def _health_of(connection: sa.Connection, venue_id: str) -> VenueHealth | None:
+    """Return the health of a venue, None if there is no such venue."""
+    newest = newest_revision(connection, venue_id)
+    if newest is None:
+        return None
+    quality = read_quality(connection, venue_id) or QualityRow()
+    alarms = active_alarms(connection, [venue_id]).get(venue_id, [])
+    return VenueHealth(
+        state="alarm" if alarms else "ok",
+        alarms=alarms,
+        revision=newest.revision,
+        cameras=[_camera_health(camera, quality.history(camera.id)) for camera in newest.cameras],
+        stitch_error_px=quality.stitch_error_px,
+        accepted_at=quality.accepted_at,
+        rejected_in_a_row=quality.rejected_in_a_row,
+        schedule=schedule_of(connection, venue_id),
+    )
+
+
+def _camera_health(camera: RevisionCamera, history: CameraHistory) -> CameraHealth:
+    return CameraHealth(**dict(camera), accepted_at=history.accepted_at, rejected_in_a_row=history.rejected_in_a_row)
 
 
 def find_stored(connection: sa.Connection, venue_id: str) -> StoredVenue | None:

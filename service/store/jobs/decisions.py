@@ -21,12 +21,7 @@ from service.store.refusals import nothing_to_decide, venue_moved_on
 from service.store.revisions import CALIBRATION_CAUSES, newest_revision, revision_before, revision_of_job
 from service.store.venue_fold import faults_of, with_calibration, with_night, with_result, with_result_in_use
 from service.store.venue_state import load, write_changes
-from service.store.venues import (
-    find_readable,
-    find_replaceable,
-    find_stored,
-    restore_state,
-)
+from service.store.venues import find_readable, find_replaceable, find_stored, restore_state
 
 j = tables.jobs.c
 
