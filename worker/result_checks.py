@@ -14,7 +14,7 @@ from service.schemas.geometry import AGREEING_M, FARTHEST_M
 from service.schemas.results import Result
 from service.schemas.rotation import rotate
 from service.store.jobs.task import Task
-from service.store.venues import faults_of, with_result
+from service.store.venue_fold import faults_of, with_result
 from worker.protocol import Message
 
 POSE = {"rotation", "position", "translation"}

@@ -36,8 +36,8 @@ from service.store.statistics.job_outcome import (
 )
 from service.store.statistics.snapshot import StatisticsSnapshot, VenueGauges
 from service.store.statistics.source_timings import FETCH, FRAME, NONE
-from service.store.trends import CameraTrend
 from service.store.unreadable import RowKind, unreadable_rows
+from service.store.venue_state import AnchorRow
 from service.store.workers import WorkerHeartbeat
 
 # Name, help and value of gauges; an unknown value (None) makes no sample.
@@ -55,7 +55,7 @@ OF_VENUES: tuple[tuple[str, str, Callable[[VenueGauges], float | None]], ...] = 
         lambda venue: None if venue.accepted_at is None else venue.accepted_at.timestamp(),
     ),
 )
-OF_CAMERAS: tuple[tuple[str, str, Callable[[CameraTrend], float | None]], ...] = (
+OF_CAMERAS: tuple[tuple[str, str, Callable[[AnchorRow], float | None]], ...] = (
     (
         "esc_camera_trend_meters",
         "Distance of the camera's moving average from its baseline, at the far touchline.",
@@ -90,7 +90,7 @@ OF_LIVE_POSES: tuple[tuple[str, str, Callable[[LiveGauges], float | None]], ...]
     ),
 )
 OF_A_VENUE: Mapping[str, Callable[[Any], str]] = {"venue": lambda figures: figures.venue}
-Figures = TypeVar("Figures", VenueGauges, CameraTrend, LiveGauges)
+Figures = TypeVar("Figures", VenueGauges, AnchorRow, LiveGauges)
 log = structlog.get_logger()
 
 

@@ -29,7 +29,7 @@ from service.schemas.venue import Venue
 from service.schemas.view import ViewChoice
 from service.store.preconditions import venue_etag
 from service.store.repositories import Repositories
-from service.store.statistics.venue_summary import CalibrationSummary
+from service.store.statistics.venue_quality import CalibrationSummary
 from service.store.unreadable import UnreadableRow
 
 PER_PAGE = 50

@@ -21,30 +21,16 @@ from service.schemas.problems import Problem
 from service.schemas.results import NO_CHOICE, AdoptableNumber, Refined, Result
 from service.schemas.venue import Camera, Venue
 from service.store import tables
-from service.store.alarms import update_alarms
-from service.store.database import Repository, advisory_lock, reading, writing
+from service.store.alarms import with_alarms
+from service.store.database import Repository, lock_venue, reading, writing
 from service.store.jobs.queries import FoundSite, found_poses, found_site
-from service.store.memories import keep_memories, newest_memories
+from service.store.memories import newest_memories
 from service.store.preconditions import UNCONDITIONAL, Precondition
 from service.store.refusals import camera_of, no_refined_pose, no_refined_since, venue_moved_on
-from service.store.revisions import (
-    CALIBRATION_CAUSES,
-    FIELD_NUMBERS,
-    add_revision,
-    newest_revision,
-    revision_of_job,
-    state_at,
-)
-from service.store.statistics.venue_quality import update_quality
-from service.store.venues import (
-    changing_venue,
-    find_readable,
-    find_stored,
-    save_venue,
-    store_venue,
-    venue_lock,
-    with_result,
-)
+from service.store.revisions import CALIBRATION_CAUSES, FIELD_NUMBERS, newest_revision, revision_of_job, state_at
+from service.store.venue_fold import with_result, with_revision, with_venue
+from service.store.venue_state import load, write_changes
+from service.store.venues import changing_venue, find_readable, find_stored, store_venue
 
 # Newest revisions in which the accepted pose of a camera is looked for: others may have been accepted without it since.
 SEARCHED_REVISIONS = 20
@@ -90,11 +76,10 @@ class AdoptionRepository(Repository):
                 raise no_refined_pose(camera_id, no_refined_since(venue_id))
             venue = with_refined(before, {camera_id: refined}, keep_sigma=True)
             if not venue.has_same_poses_as(before):
-                with update_quality(connection, venue_id) as quality:
-                    save_venue(connection, venue, quality.now, stored)
-                    number = add_revision(connection, quality, venue, "adopted", job_id, by=by)
-                    keep_memories(connection, venue_id, number, newest_memories(connection, venue_id))
-                    update_alarms(connection, quality, venue)
+                memories = newest_memories(connection, venue_id)
+                changes = with_venue(load(connection, venue_id), stored, venue)
+                changes = with_revision(changes, venue, "adopted", memories, job_id, by)
+                write_changes(connection, with_alarms(changes, venue))
             return venue
 
     def adoptable_numbers(self, job_id: str) -> dict[str, Adoptable]:
@@ -177,7 +162,7 @@ class AdoptionRepository(Repository):
         if the field or a chosen camera is not as the search began with it. Nothing is written if all stands so already.
         """
         with writing(self._engine) as connection:
-            advisory_lock(connection, venue_lock(venue_id))
+            lock_venue(connection, venue_id)
             found = found_site(connection, job_id)
             if found is None or found.site.id != venue_id:
                 why = f"Venue {venue_id} has no job of this id that looked for its cameras and ended."

@@ -219,6 +219,11 @@ def advisory_lock(connection: sa.Connection, about: str) -> None:
         connection.execute(sa.select(sa.func.pg_advisory_xact_lock(LOCK, sa.func.hashtext(about))))
 
 
+def lock_venue(connection: sa.Connection, venue_id: str) -> None:
+    """Wait until no other transaction that changes a venue, or relies on it, is open."""
+    advisory_lock(connection, f"venue {venue_id}")
+
+
 def clock(connection: sa.Connection) -> datetime:
     """Return the time of the clock that all processes share: that of PostgreSQL, or of the machine with SQLite."""
     if connection.dialect.name == "postgresql":

@@ -19,12 +19,12 @@ from service.schemas.live import LiveCamera, LiveMinute, LiveMinuteCamera, LiveR
 from service.schemas.problems import Problem
 from service.schemas.venue import Venue
 from service.store import live_alarms, tables
-from service.store.database import Repository, advisory_lock, clock, reading, writing
+from service.store.database import Repository, clock, lock_venue, reading, writing
 from service.store.documents import to_document
 from service.store.refusals import no_such_venue
 from service.store.statistics.counters import INSERT
 from service.store.unreadable import read_or, read_values
-from service.store.venues import find_venue, venue_lock
+from service.store.venues import find_venue
 
 RUNNING_WITHIN, LATELY = timedelta(seconds=5), timedelta(days=1)
 # The share of measured pictures in /metrics is over the current minute and the one before it.
@@ -52,7 +52,7 @@ class LiveRepository(Repository):
         Raises the problems `venue-not-found`, and `unknown-camera` for a camera that the venue does not have.
         """
         with writing(self._engine) as connection:
-            advisory_lock(connection, venue_lock(venue_id))
+            lock_venue(connection, venue_id)
             venue = find_venue(connection, venue_id)
             if venue is None:
                 raise no_such_venue(venue_id)

@@ -7,7 +7,7 @@ and lets it cool again, which is no trend.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from datetime import datetime
 from itertools import groupby
 from math import hypot
@@ -24,6 +24,7 @@ from service.control_charts import (
     charted,
 )
 from service.schemas.trend import Chart, Quantity, Trend, TrendPoint, TrendState
+from service.store.unreadable import read_or
 
 # The shift at the far touchline that is an alarm, where the venue says nothing else.
 ALARM_M = 0.05
@@ -199,6 +200,32 @@ class CameraCharts:
             ],
             state=self.state(number, alarm_m),
         )
+
+
+def chart_columns(camera: str, since: Rows, anchor: Any) -> dict[str, Any]:
+    """Return the chart columns of the anchor of a camera, by the rows since it."""
+    if not since:
+        return no_chart_columns(camera)
+    charts = CameraCharts.of(since, baselines_of(anchor))
+    last = len(charts.nights) - 1
+    return {
+        "baselines": {quantity: asdict(baseline) for quantity, baseline in charts.settled.items()},
+        "beyond": bool(charts.beyond(last)),
+        "moved_m": charts.moved_m(last),
+        "cusum": charts.cusum(last),
+        "words": charts.words(camera),
+    }
+
+
+def no_chart_columns(camera: str) -> dict[str, Any]:
+    """Return the columns of an anchor without an accepted pose."""
+    words = f"Camera {camera} has had no pose accepted since it was put."
+    return dict.fromkeys(("at", "posed", "moved_m", "cusum")) | {"baselines": {}, "beyond": False, "words": words}
+
+
+def baselines_of(anchor: Any) -> Mapping[str, Baseline]:
+    """Return the settled baselines of an anchor by quantity; {} if they cannot be read, and they begin anew."""
+    return read_or({}, "trend", anchor.venue, lambda: {key: Baseline(**one) for key, one in anchor.baselines.items()})
 
 
 def _last_points(several: Sequence[Series], number: int) -> list[ChartPoint]:

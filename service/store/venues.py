@@ -5,45 +5,32 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from datetime import datetime, timedelta
+from datetime import timedelta
 from itertools import count
 from types import MappingProxyType
 from typing import Any, Literal
 
 import sqlalchemy as sa
-from pydantic import ValidationError
 
 from service.schemas.actor import Actor
-from service.schemas.base import TOLERANTLY, Unreadable
+from service.schemas.base import Unreadable
 from service.schemas.field import FieldOfPlay
-from service.schemas.findings import describe_errors
-from service.schemas.health import VenueHealth
-from service.schemas.history import Cause, Revision
+from service.schemas.health import CameraHealth, VenueHealth
+from service.schemas.history import Cause, Revision, RevisionCamera
 from service.schemas.names import OPEN_STATUSES
-from service.schemas.problems import Problem
-from service.schemas.results import Result
 from service.schemas.source_urls import SourceSecrets
-from service.schemas.venue import Venue, VenueIn
+from service.schemas.venue import Venue
 from service.store import live_alarms, tables
-from service.store.alarms import health_of, update_alarms
+from service.store.alarms import with_alarms
 from service.store.credentials import merge_credentials, read_credentials, write_credentials
-from service.store.database import Repository, advisory_lock, clock, reading, writing
-from service.store.documents import Document, stored_venue, to_document, with_unknown_fields_of
-from service.store.events.event_log import add_venue_event
-from service.store.memories import (
-    Memories,
-    forget_memories,
-    keep_memories,
-    memories_at,
-    newest_memories,
-    revisions_with_memories,
-    without_those_that_changed,
-)
+from service.store.database import Repository, clock, lock_venue, reading, writing
+from service.store.documents import stored_venue
+from service.store.events.event_log import add_event, venue_event
+from service.store.memories import memories_at, newest_memories, revisions_with_memories
 from service.store.preconditions import UNCONDITIONAL, Precondition
 from service.store.refusals import no_such_venue, venue_busy
 from service.store.revisions import (
     RevisionPage,
-    add_revision,
     documents_as_of_revisions,
     newest_revision,
     origin_of,
@@ -51,10 +38,11 @@ from service.store.revisions import (
     revisions_that_fit,
     state_at,
 )
-from service.store.schedules import plan_schedule
-from service.store.statistics.venue_quality import VenueQuality, update_quality
-from service.store.trends import forget_trends, note_night
-from service.store.unreadable import MOST_FAULTS, UnreadableRow, read_each, reading_row
+from service.store.schedules import plan_schedule, schedule_of
+from service.store.statistics.venue_quality import CameraHistory, QualityRow, read_quality
+from service.store.unreadable import UnreadableRow, read_each
+from service.store.venue_fold import with_revision_restored, with_venue_put
+from service.store.venue_state import StoredVenue, active_alarms, load, read_venue, write_changes
 
 v = tables.venues.c
 # Tables whose rows are deleted with their venue.
@@ -74,18 +62,6 @@ OF_VENUES = (
 
 # Interval in which a duty looks whether somebody has repaired an unreadable venue.
 UNREADABLE_RETRY = timedelta(minutes=10)
-
-
-@dataclass(frozen=True)
-class StoredVenue:
-    """A venue and its stored document, with fields that other versions have written into it.
-
-    `unreadable`: why the document cannot be read; then `venue` is what could be salvaged of it, see `find_replaceable`.
-    """
-
-    venue: Venue
-    document: Document
-    unreadable: str | None = None
 
 
 @dataclass(frozen=True)
@@ -135,7 +111,7 @@ class VenueRepository(Repository):
             query = query.where(rings if state == "alarm" else sa.not_(rings))
         with reading(self._engine) as connection:
             rows = connection.execute(query).all()
-        venues, unreadable = read_each(rows[:limit], _venue_in)
+        venues, unreadable = read_each(rows[:limit], lambda row: read_venue(row.id, row.document).venue)
         return VenuePage(venues, unreadable, rows[limit - 1].id if len(rows) > limit else None)
 
     def put(
@@ -150,7 +126,7 @@ class VenueRepository(Repository):
         `secrets`: those of its sources as they were sent, by camera. What came hidden stays as it was stored.
         """
         with writing(self._engine) as connection:
-            advisory_lock(connection, venue_lock(venue.id))
+            lock_venue(connection, venue.id)
             stored = find_replaceable(connection, venue.id)
             precondition.check(None if stored is None else stored.venue)
             return _put(connection, stored, venue, secrets, by), stored is None
@@ -175,10 +151,7 @@ class VenueRepository(Repository):
         the problems `revision-not-found` and `revision-unfit`. Writes nothing if the venue has these poses already.
         """
         with changing_venue(self._engine, venue_id, precondition, find_replaceable) as (connection, before):
-            with update_quality(connection, venue_id) as quality:
-                restored, forgetful = restore_state(connection, quality, before, number, by)
-                update_alarms(connection, quality, restored)
-            return restored, forgetful
+            return restore_state(connection, before, number, by)
 
     def with_memories(self, venue_id: str) -> set[int]:
         """Return the revisions of a venue whose memories are kept, so that `restore` brings them back."""
@@ -199,12 +172,12 @@ class VenueRepository(Repository):
     def update_alarms(self, venue_id: str) -> None:
         """Begin and end the alarms of a venue that depend on the time."""
         with writing(self._engine) as connection:
-            advisory_lock(connection, venue_lock(venue_id))
+            lock_venue(connection, venue_id)
             venue = find_venue(connection, venue_id)
             if venue is not None:
-                with update_quality(connection, venue_id) as quality:
-                    update_alarms(connection, quality, venue)
-                    live_alarms.plan_next(connection, venue_id, quality.now)
+                changes = with_alarms(load(connection, venue_id), venue)
+                write_changes(connection, changes)
+                live_alarms.plan_next(connection, venue_id, changes.after.now)
 
     def postpone_alarms(self, venue_id: str) -> None:
         """Postpone the alarms of a venue that cannot be read by `UNREADABLE_RETRY`."""
@@ -226,7 +199,7 @@ class VenueRepository(Repository):
     def health(self, venue_id: str) -> VenueHealth | None:
         """Return the health of a venue, None if there is none."""
         with reading(self._engine) as connection:
-            return health_of(connection, venue_id)
+            return _health_of(connection, venue_id)
 
     def delete(self, venue_id: str, precondition: Precondition = UNCONDITIONAL, by: Actor | None = None) -> None:
         """Delete a venue, readable or not, with its history; raises the problem `venue-busy` if a job of it is open."""
@@ -236,7 +209,7 @@ class VenueRepository(Repository):
             if active is not None:
                 raise venue_busy(active)
             precondition.check(stored.venue)
-            add_venue_event(connection, stored.venue, "venue.deleted", [], by)
+            add_event(connection, venue_id, venue_event(stored.venue, "venue.deleted", [], clock(connection), by))
             for table in OF_VENUES:
                 connection.execute(sa.delete(table).where(table.c.venue == venue_id))
             connection.execute(sa.delete(tables.venues).where(v.id == venue_id))
@@ -285,10 +258,33 @@ class VenueRepository(Repository):
             return None if newest is None else (newest, origin_of(connection, venue_id, newest))
 
 
+def _health_of(connection: sa.Connection, venue_id: str) -> VenueHealth | None:
+    """Return the health of a venue, None if there is no such venue."""
+    newest = newest_revision(connection, venue_id)
+    if newest is None:
+        return None
+    quality = read_quality(connection, venue_id) or QualityRow()
+    alarms = active_alarms(connection, [venue_id]).get(venue_id, [])
+    return VenueHealth(
+        state="alarm" if alarms else "ok",
+        alarms=alarms,
+        revision=newest.revision,
+        cameras=[_camera_health(camera, quality.history(camera.id)) for camera in newest.cameras],
+        stitch_error_px=quality.stitch_error_px,
+        accepted_at=quality.accepted_at,
+        rejected_in_a_row=quality.rejected_in_a_row,
+        schedule=schedule_of(connection, venue_id),
+    )
+
+
+def _camera_health(camera: RevisionCamera, history: CameraHistory) -> CameraHealth:
+    return CameraHealth(**dict(camera), accepted_at=history.accepted_at, rejected_in_a_row=history.rejected_in_a_row)
+
+
 def find_stored(connection: sa.Connection, venue_id: str) -> StoredVenue | None:
     """Return a stored venue for a transaction that may change it. Raises `UnreadableRow`."""
     row = _row_of(connection, venue_id)
-    return None if row is None else StoredVenue(_venue_in(row), row.document)
+    return None if row is None else read_venue(row.id, row.document)
 
 
 def find_replaceable(connection: sa.Connection, venue_id: str) -> StoredVenue | None:
@@ -301,7 +297,7 @@ def find_replaceable(connection: sa.Connection, venue_id: str) -> StoredVenue | 
     if row is None:
         return None
     try:
-        return StoredVenue(_venue_in(row), row.document)
+        return read_venue(row.id, row.document)
     except UnreadableRow as error:
         for document in documents_as_of_revisions(connection, venue_id, row.document):
             with suppress(ValueError):
@@ -322,11 +318,6 @@ def _row_of(connection: sa.Connection, venue_id: str) -> Any:
     return connection.execute(sa.select(v.id, v.document).where(v.id == venue_id)).one_or_none()
 
 
-def _venue_in(row: Any) -> Venue:
-    with reading_row("venue", row.id):
-        return stored_venue(row.document)
-
-
 @contextmanager
 def changing_venue(
     engine: sa.Engine, venue_id: str, precondition: Precondition = UNCONDITIONAL, find: Find = find_stored
@@ -336,7 +327,7 @@ def changing_venue(
     Raises the problem `venue-not-found`, and `venue-changed` unless the venue meets the `precondition`.
     """
     with writing(engine) as connection:
-        advisory_lock(connection, venue_lock(venue_id))
+        lock_venue(connection, venue_id)
         stored = find(connection, venue_id)
         if stored is None:
             raise no_such_venue(venue_id)
@@ -344,49 +335,10 @@ def changing_venue(
         yield connection, stored
 
 
-def venue_lock(venue_id: str) -> str:
-    """Return the name of the advisory lock for transactions that change a venue or rely on it."""
-    return f"venue {venue_id}"
-
-
 def find_venue(connection: sa.Connection, venue_id: str) -> Venue | None:
     """Return a venue inside the caller's transaction, None if there is none. Raises `UnreadableRow`."""
     stored = find_stored(connection, venue_id)
     return None if stored is None else stored.venue
-
-
-def faults_of(venue: Venue) -> list[str]:
-    """Return in words why a client could not send a venue: a stored one must be fit to be sent back as it is."""
-    document = venue.model_dump(mode="json")
-    try:
-        # Words of newer versions are no faults.
-        VenueIn.model_validate(document, **TOLERANTLY)
-    except ValidationError as error:
-        return describe_errors(error.errors(), None, document)
-    return []
-
-
-def save_venue(connection: sa.Connection, venue: Venue, now: datetime, before: StoredVenue | None) -> None:
-    """Create or replace the row of a venue, inside the caller's serialised transaction; `before`: as it is stored.
-
-    Raises the problem `poses-refused` for a venue that a client could not send, as its reader could not send it back.
-    """
-    faults = faults_of(venue)
-    if faults and before is not None:
-        # Faults that another release has let pass do not keep this one from changing the rest.
-        old_faults = faults_of(before.venue)
-        faults = [fault for fault in faults if fault not in old_faults]
-    if faults:
-        why = "; ".join(faults[:MOST_FAULTS])
-        raise Problem(
-            "poses-refused", f"{why}. Nothing was changed. Calibrate again; if it is the ridge, without fit_ridge."
-        )
-    document = to_document(venue)
-    if before is None:
-        connection.execute(sa.insert(tables.venues).values(id=venue.id, document=document, updated_at=now))
-    else:
-        whole = with_unknown_fields_of(before.document, document)
-        connection.execute(sa.update(tables.venues).where(v.id == venue.id).values(document=whole, updated_at=now))
 
 
 def _put(
@@ -417,115 +369,24 @@ def store_venue(
 
     `stored`: the venue so far; `cause` and `job_id`: those of the revision, if a pose or a lens changes.
     """
-    before = None if stored is None else stored.venue
-    save_venue(connection, venue, clock(connection), stored)
-    if before is None:
-        add_venue_event(connection, venue, "venue.created", [], by)
-    elif changed := venue.changed_parts(before):
-        add_venue_event(connection, venue, "venue.changed", changed, by)
-    with update_quality(connection, venue.id) as quality:
-        _add_revision_if_moved(connection, quality, stored, venue, cause, job_id, by)
-        update_alarms(connection, quality, venue)
+    memories = newest_memories(connection, venue.id)
+    changes = with_venue_put(load(connection, venue.id), stored, venue, memories, cause, by, job_id)
+    write_changes(connection, changes)
     plan_schedule(connection, venue)
 
 
-def _add_revision_if_moved(
-    connection: sa.Connection,
-    quality: VenueQuality,
-    stored: StoredVenue | None,
-    venue: Venue,
-    cause: Cause,
-    job_id: str | None,
-    by: Actor | None,
-) -> None:
-    """Add the revision that a change of a venue makes, if it makes one, with the memories that stay.
-
-    A camera that was put elsewhere, or has another lens, begins anew, and on another field all of them do.
-    """
-    before = None if stored is None else stored.venue
-    if before is not None and before.field != venue.field:
-        forget_memories(connection, venue.id)
-        forget_trends(connection, venue.id)
-    is_adopted = cause == "adopted"
-    if stored is None or before is None or stored.unreadable or is_adopted or not venue.has_same_poses_as(before):
-        memories = newest_memories(connection, venue.id)
-        kept = {} if before is None else without_those_that_changed(memories, before, venue)
-        field_before = before.field if before is not None and is_adopted else None
-        number = add_revision(connection, quality, venue, cause, job_id, by=by, field_before=field_before)
-        keep_memories(connection, venue.id, number, kept)
-
-
-def apply_result(
-    connection: sa.Connection,
-    quality: VenueQuality,
-    stored: StoredVenue,
-    result: Result,
-    cameras: Collection[str],
-    cause: Cause,
-    job_id: str,
-    memories: Memories,
-    by: Actor | None,
-) -> None:
-    """Store some cameras of a venue as a calibration found them, inside the caller's serialised transaction.
-
-    `memories`: those of the venue from then on.
-    """
-    found = with_result(stored.venue, result, cameras)
-    save_venue(connection, found, quality.now, stored)
-    quality.hold(result, cameras)
-    number = add_revision(connection, quality, found, cause, job_id, stitch_error_px=result.stitch_error_px, by=by)
-    keep_memories(connection, found.id, number, memories)
-    night = [camera for camera in result.cameras if camera.id in cameras]
-    note_night(connection, found, night, job_id, number, quality.now, by_hand=cause == "accepted")
-    update_alarms(connection, quality, found)
-
-
-def with_result(venue: Venue, result: Result, cameras: Collection[str] | None = None) -> Venue:
-    """Return a venue with the poses, lenses, light and ridge that a calibration found.
-
-    `cameras`: only theirs; None: those of all.
-    """
-    found = {camera.id: camera for camera in result.cameras if cameras is None or camera.id in cameras}
-    cameras_found = [
-        camera.model_copy(
-            update={
-                "pose": found[camera.id].pose,
-                "intrinsics": found[camera.id].intrinsics or camera.intrinsics,
-                "light": found[camera.id].light or camera.light,
-            }
-        )
-        if camera.id in found
-        else camera
-        for camera in venue.cameras
-    ]
-    field = venue.field if result.ridge is None else venue.field.model_copy(update={"ridge": result.ridge})
-    return venue.model_copy(update={"cameras": cameras_found, "field": field})
-
-
 def restore_state(
-    connection: sa.Connection,
-    quality: VenueQuality,
-    stored: StoredVenue,
-    number: int,
-    by: Actor | None,
-    rejected_job: str | None = None,
+    connection: sa.Connection, stored: StoredVenue, number: int, by: Actor | None, rejected_job: str | None = None
 ) -> tuple[Venue, list[str]]:
-    """Restore a revision of a venue with its memories, inside the caller's serialised transaction.
+    """Restore a revision of a venue with its memories and alarms, inside the caller's serialised transaction.
 
     Returns the venue, and the cameras that have a memory before and none after it.
     """
-    before, forgetful = stored.venue, list[str]()
-    then, revision = state_at(connection, before, number)
-    if stored.unreadable or not then.has_same_calibration_input_as(before):
-        save_venue(connection, then, quality.now, stored)
-        if then.field.size != before.field.size:
-            add_venue_event(connection, then, "venue.changed", ["field"], by)
-        memories = memories_at(connection, then.id, number)
-        forgetful = [camera for camera in newest_memories(connection, then.id) if camera not in memories]
-        px = revision.stitch_error_px
-        restored = add_revision(
-            connection, quality, then, "restored", rejected_job, revision, px, by, field_before=before.field
-        )
-        keep_memories(connection, then.id, restored, memories)
-        quality.row.stitch_error_px = revision.stitch_error_px
-    return then, forgetful
+    then, revision = state_at(connection, stored.venue, number)
+    counted_from = {camera.drift_since for camera in revision.cameras}
+    changes = load(connection, then.id, [camera.id for camera in then.cameras], counted_from)
+    memories = memories_at(connection, then.id, number)
+    changes = with_revision_restored(changes, stored, then, revision, memories, by, rejected_job)
+    forgetful = [camera for camera in newest_memories(connection, then.id) if camera not in memories]
+    write_changes(connection, changes)
+    return then, [] if changes.memories is None else forgetful

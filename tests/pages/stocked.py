@@ -10,8 +10,9 @@ from service.schemas.options import Options
 from service.schemas.venue import Venue, VenueIn
 from service.store import tables
 from service.store.ids import new_id
-from service.store.statistics.venue_quality import update_quality
-from service.store.statistics.venue_summary import IN_CURVE
+from service.store.statistics.venue_quality import IN_CURVE
+from service.store.venue_fold import with_calibration_end
+from service.store.venue_state import load, write_changes
 from testbed import running
 from testbed.stock import result
 
@@ -57,9 +58,8 @@ def calibrations(connection: sa.Connection, venue_id: str, count: int) -> None:
             }
         )
         if number >= count - IN_CURVE:
-            with update_quality(connection, venue_id) as quality:
-                quality.now = at
-                quality.ended("succeeded", found, dry_run=False)
+            now = load(connection, venue_id).with_state(now=at)
+            write_changes(connection, with_calibration_end(now, "succeeded", found, dry_run=False))
     connection.execute(sa.insert(tables.jobs), rows)
 
 

@@ -18,7 +18,7 @@ from service.schemas.results import CameraResult, Provenance, Result
 from service.schemas.venue import VenueIn
 from service.store.database import connect, migrate
 from service.store.ids import new_id
-from service.store.jobs import attempts
+from service.store.jobs import ending
 from service.store.jobs import submission as submissions
 from service.store.jobs.queries import JobPage
 from service.store.jobs.submission import Submission
@@ -145,16 +145,16 @@ def test_the_poses_move_only_with_the_job_that_ends_with_them(stock, running, mo
         "fail": lambda: stock.attempts.fail(running, JobError(type="/problems/job-crashed", title="", detail="")),
     }
     meddler = Thread(target=meddle[other])
-    find_stored = attempts.find_stored
+    fold = ending.fold
 
-    def find_stored_slowly(*arguments):
-        # Who meddles may look for the venue too.
+    def fold_slowly(*arguments):
+        # Who meddles may end the job too.
         if meddler.ident is None:
             meddler.start()
             meddler.join(0.5)
-        return find_stored(*arguments)
+        return fold(*arguments)
 
-    monkeypatch.setattr(attempts, "find_stored", find_stored_slowly)
+    monkeypatch.setattr(ending, "fold", fold_slowly)
     stock.attempts.finish(running, found(), [])
     meddler.join()
     moved = stock.venues.get("v").cameras[0].pose.position == SHIFTED

@@ -14,29 +14,22 @@ from typing import Any
 
 import sqlalchemy as sa
 
-from service.schemas.history import Cause
 from service.schemas.job import JobError, Progress
 from service.schemas.names import JobKind
-from service.schemas.options import Options
-from service.schemas.refusals import refuse
-from service.schemas.results import AnyResult, Result
-from service.schemas.venue import Venue
+from service.schemas.results import AnyResult
 from service.store import tables
-from service.store.alarms import update_alarms
-from service.store.database import Repository, advisory_lock, clock, reading, writing
-from service.store.jobs.ending import RowConditions, changed, end_job, still_open
+from service.store.database import Repository, clock, reading, writing
+from service.store.jobs.ending import End, RowConditions, changed, end_job, still_open
 from service.store.jobs.queries import ONE, job_input_values
 from service.store.jobs.task import Task, UnreadableJob, parse_job_input
 from service.store.memories import Memories, newest_memories
 from service.store.silence import unheard_for
-from service.store.statistics.venue_quality import VenueQuality, last_accepted_views, update_quality
+from service.store.statistics.venue_quality import last_accepted_views
 from service.store.trends import anchors_of
-from service.store.venues import apply_result, find_readable, find_stored, venue_lock
 
+NO_MEMORIES: Memories = MappingProxyType({})
 # Job, priority and kind, into the queue in the caller's transaction.
 Enqueue = Callable[[sa.Connection, str, int, JobKind], None]
-NO_MEMORIES: Memories = MappingProxyType({})
-DONE = Progress(stage="preview", fraction=1.0)
 j = tables.jobs.c
 
 
@@ -147,29 +140,21 @@ class AttemptRepository(Repository):
         If it is that of a calibration, the poses that are accepted become the stored ones in the same transaction, and
         `memories` those of their cameras.
         """
+        end = End(
+            "succeeded",
+            result,
+            pictures=pictures,
+            began_with=task.venue,
+            memories=memories,
+            submitter=task.origin.actor,
+        )
         with writing(self._engine) as connection:
-            if task.venue_id is not None:
-                advisory_lock(connection, venue_lock(task.venue_id))
-            if not _locked(connection, _fence(task)):
-                return
-            with update_quality(connection, task.venue_id) as quality:
-                if isinstance(result, Result):
-                    result = _move_poses(connection, quality, task, result, memories)
-                end_job(
-                    connection,
-                    task.job_id,
-                    _fence(task),
-                    "succeeded",
-                    quality,
-                    result=result,
-                    pictures=list(pictures),
-                    progress=DONE.model_dump(),
-                )
+            end_job(connection, task.job_id, _fence(task), end)
 
     def fail(self, task: Task, error: JobError) -> None:
         """End a job without a result."""
         with writing(self._engine) as connection:
-            end_without_result(connection, task.job_id, _fence(task), error)
+            end_job(connection, task.job_id, _fence(task), End("failed", error=error))
 
     def hand_back(self, task: Task) -> bool:
         """Let a job wait again as if this attempt of it had not been; False if the attempt has ended or lost it."""
@@ -184,7 +169,7 @@ class AttemptRepository(Repository):
         """End an open job that the queue has given up; False if it has ended or was heard of meanwhile."""
         with writing(self._engine) as connection:
             conditions = [*still_open(job_id), unheard_for(seconds, clock(connection))]
-            return end_without_result(connection, job_id, conditions, error)
+            return end_job(connection, job_id, conditions, End("failed", error=error))
 
 
 def _fence(task: Task) -> RowConditions:
@@ -208,57 +193,3 @@ def _progress_columns(progress: Mapping[str, Progress]) -> dict[str, sa.ColumnEl
         "progress": sa.case(shown, value=j.run_token, else_=j.progress),
         "revision": j.revision + sa.case((j.run_token.in_(progress), 1), else_=0),
     }
-
-
-def _locked(connection: sa.Connection, conditions: RowConditions) -> bool:
-    """Lock the row of a job; True if conditions hold: a cancellation comes before an end or after it, not within."""
-    return connection.scalar(sa.select(j.id).where(*conditions).with_for_update()) is not None
-
-
-def _move_poses(
-    connection: sa.Connection, quality: VenueQuality, task: Task, result: Result, memories: Memories
-) -> Result:
-    """Store the accepted poses and the memories of their cameras, and fold the result into the venue's quality.
-
-    Return the result, which is refused where the venue was changed meanwhile.
-    """
-    assert task.venue is not None
-    assert isinstance(task.options, Options)
-    stored = find_stored(connection, task.venue.id)
-    if stored is None or not stored.venue.has_same_calibration_input_as(task.venue):
-        if not result.accepted_cameras:
-            return result
-        return refuse(result, "the venue was changed while the job ran", "venue-changed")
-    held = [] if task.options.dry_run else result.accepted_cameras
-    quality.calibrated(result, moved=bool(held))
-    if held:
-        quality.missed(stored.venue.poses.keys() - held)
-        with_this_job = {camera: memory for camera, memory in memories.items() if camera in held}
-        known = {**newest_memories(connection, task.venue.id), **with_this_job}
-        cause: Cause = "recovered" if result.recovered_cameras else "calibrated"
-        apply_result(connection, quality, stored, result, held, cause, task.job_id, known, task.origin.actor)
-    elif not task.options.dry_run:
-        _miss(connection, quality, stored.venue)
-    return result
-
-
-def end_without_result(connection: sa.Connection, job_id: str, conditions: RowConditions, error: JobError) -> bool:
-    """Fail a job inside the caller's transaction; False, and nothing is done, unless the row meets the conditions."""
-    row = connection.execute(sa.select(j.kind, j.venue, j.options).where(j.id == job_id)).one()
-    misses = row.kind == "calibration" and not row.options["dry_run"]
-    if row.venue is not None:
-        advisory_lock(connection, venue_lock(row.venue))
-    if not _locked(connection, conditions):
-        return False
-    venue = find_readable(connection, row.venue) if misses else None
-    with update_quality(connection, row.venue) as quality:
-        if venue is not None:
-            # Alarms are counted before ends wherever both are, so that no two transactions wait for each other.
-            _miss(connection, quality, venue)
-        return end_job(connection, job_id, conditions, "failed", quality, error=error)
-
-
-def _miss(connection: sa.Connection, quality: VenueQuality, venue: Venue) -> None:
-    """Fold in a calibration that was to bring poses and brought none."""
-    quality.brought_none(venue.poses.keys())
-    update_alarms(connection, quality, venue)

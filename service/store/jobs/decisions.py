@@ -12,25 +12,16 @@ from service.schemas.history import Revision
 from service.schemas.results import Result
 from service.schemas.venue import Venue
 from service.store import tables
-from service.store.alarms import update_alarms
-from service.store.database import Repository, advisory_lock, clock, reading, writing
-from service.store.jobs.ending import changed, end_job, still_open
+from service.store.alarms import with_alarms
+from service.store.database import Repository, clock, lock_venue, reading, writing
+from service.store.jobs.ending import End, changed, end_job, still_open
 from service.store.jobs.queries import found_poses, read_job
 from service.store.memories import Memories, newest_memories
 from service.store.refusals import nothing_to_decide, venue_moved_on
 from service.store.revisions import CALIBRATION_CAUSES, newest_revision, revision_before, revision_of_job
-from service.store.statistics.venue_quality import update_quality
-from service.store.trends import note_night
-from service.store.venues import (
-    apply_result,
-    faults_of,
-    find_readable,
-    find_replaceable,
-    find_stored,
-    restore_state,
-    venue_lock,
-    with_result,
-)
+from service.store.venue_fold import faults_of, with_calibration, with_night, with_result, with_result_in_use
+from service.store.venue_state import load, write_changes
+from service.store.venues import find_readable, find_replaceable, find_stored, restore_state
 
 j = tables.jobs.c
 
@@ -70,11 +61,7 @@ class DecisionRepository(Repository):
     def cancel(self, job_id: str, by: Actor | None = None) -> None:
         """End a job that is still open; its worker notices."""
         with writing(self._engine) as connection:
-            venue_id = connection.scalar(sa.select(j.venue).where(j.id == job_id))
-            if venue_id is not None:
-                advisory_lock(connection, venue_lock(venue_id))
-            with update_quality(connection, venue_id) as quality:
-                end_job(connection, job_id, still_open(job_id), "cancelled", quality, by=by)
+            end_job(connection, job_id, still_open(job_id), End("cancelled", by=by))
 
     def accept(self, job_id: str, cameras: Collection[str] | None = None, by: Actor | None = None) -> None:
         """Let the poses that a calibration found hold, whatever the gate said.
@@ -89,23 +76,17 @@ class DecisionRepository(Repository):
             stored = find_stored(connection, began_with.id)
             now_stored = None if stored is None else stored.venue
             left_by_it = _was_taken(job_id, newest)
-            if (
-                now_stored
-                and newest
-                and left_by_it
-                and with_result(now_stored, result, chosen).has_same_poses_as(now_stored)
-            ):
-                found = [camera for camera in result.cameras if camera.id in chosen]
-                with update_quality(connection, now_stored.id) as quality:
-                    note_night(connection, now_stored, found, job_id, newest.revision, quality.now, by_hand=True)
-                    update_alarms(connection, quality, now_stored)
+            changes = load(connection, began_with.id, chosen)
+            if now_stored and left_by_it and with_result(now_stored, result, chosen).has_same_poses_as(now_stored):
+                changes = with_night(changes, now_stored, result, chosen, job_id, by_hand=True)
+                write_changes(connection, with_alarms(changes, now_stored))
                 return
             if stored is None or not _untouched(stored.venue, began_with, result, taken=left_by_it):
                 raise venue_moved_on(began_with.id, job_id, newest)
             memories = _without_refused(newest_memories(connection, began_with.id), result, chosen)
-            with update_quality(connection, began_with.id) as quality:
-                quality.calibrated(result, moved=True)
-                apply_result(connection, quality, stored, result, chosen, "accepted", job_id, memories, by)
+            changes = with_calibration(changes, result, moved=True)
+            changes = with_result_in_use(changes, stored, result, chosen, "accepted", job_id, memories, by)
+            write_changes(connection, changes)
             _touch(connection, job_id)
 
     def reject(self, job_id: str, by: Actor | None = None) -> None:
@@ -123,9 +104,7 @@ class DecisionRepository(Repository):
                 stored = find_replaceable(connection, began_with.id)
                 assert stored is not None
                 before = revision_before(connection, began_with.id, job_id)
-                with update_quality(connection, began_with.id) as quality:
-                    restored, _ = restore_state(connection, quality, stored, before, by, job_id)
-                    update_alarms(connection, quality, restored)
+                restore_state(connection, stored, before, by, job_id)
                 _touch(connection, job_id)
 
 
@@ -135,7 +114,7 @@ def _found(connection: sa.Connection, job_id: str) -> tuple[Venue, Result, Revis
     if found is None:
         raise nothing_to_decide(read_job(connection, job_id))
     began_with, result = found
-    advisory_lock(connection, venue_lock(began_with.id))
+    lock_venue(connection, began_with.id)
     return began_with, result, newest_revision(connection, began_with.id)
 
 

@@ -25,7 +25,7 @@ from service.store.jobs.files import picture_address, picture_file, picture_fold
 from service.store.jobs.task import Origin
 from service.store.revisions import revisions_of_jobs
 from service.store.unreadable import read_each, reading_row
-from service.store.venues import with_result
+from service.store.venue_fold import with_result
 
 j = tables.jobs.c
 BRING_POSES: tuple[JobKind, ...] = ("calibration", "find")

@@ -14,17 +14,18 @@ from service.schemas.options import Options
 from service.schemas.problems import Problem
 from service.schemas.venue import Venue
 from service.store import tables
-from service.store.database import Repository, advisory_lock, clock, reading, writing
+from service.store.database import Repository, advisory_lock, clock, lock_venue, reading, writing
 from service.store.documents import to_document
 from service.store.events.event_log import add_queued_event
 from service.store.expiry import schedule_deletion
-from service.store.jobs.attempts import Enqueue, end_without_result
+from service.store.jobs.attempts import Enqueue
+from service.store.jobs.ending import End, end_job
 from service.store.jobs.files import frame_folder
 from service.store.jobs.queries import ONE, job_input_values, read_job
 from service.store.jobs.task import JobInput, parse_job_input
 from service.store.refusals import RETRY_AFTER_S, no_such_venue, venue_busy, venue_is_stored
 from service.store.schedules import reserved_places
-from service.store.venues import find_venue, venue_lock
+from service.store.venues import find_venue
 
 PRIORITIES = {"live": 1, "routine": 100}
 # Prefix of the content hash of a job whose frames were fetched.
@@ -78,8 +79,11 @@ class SubmissionRepository(Repository):
         """
         with writing(self._engine) as connection:
             venue_id = submission.venue_id
-            # Jobs without a venue wait for each other, so that the same content sent twice at once is one job.
-            advisory_lock(connection, submission.kind if venue_id is None else venue_lock(venue_id))
+            if venue_id is None:
+                # They wait for each other, so that the same content sent twice at once is one job.
+                advisory_lock(connection, submission.kind)
+            else:
+                lock_venue(connection, venue_id)
             same = _duplicate(
                 connection, submission.kind, venue_id, submission.idempotency_key, submission.content_hash
             )
@@ -106,12 +110,12 @@ class SubmissionRepository(Repository):
         """A job that failed before it had frames, or the job that the submission already is by its key."""
         assert submission.venue is not None
         with writing(self._engine) as connection:
-            advisory_lock(connection, venue_lock(submission.venue.id))
+            lock_venue(connection, submission.venue.id)
             same = _of_key(connection, submission.venue.id, submission.idempotency_key)
             if same is None:
                 venue, now = _as_it_is_now(connection, submission.venue), clock(connection)
                 _insert(connection, submission, venue, "failed", now, frames_deleted_at=now)
-                end_without_result(connection, submission.job_id, [j.id == submission.job_id], error)
+                end_job(connection, submission.job_id, [j.id == submission.job_id], End("failed", error=error))
         with reading(self._engine) as connection:
             return read_job(connection, submission.job_id if same is None else same.id)
 

@@ -15,7 +15,8 @@ from service.store.live import LiveGauges, live_gauges
 from service.store.schedules import lateness_s
 from service.store.statistics import counters
 from service.store.statistics.counters import CounterKey
-from service.store.trends import CameraTrend, most_moved
+from service.store.trends import most_moved
+from service.store.venue_state import AnchorRow
 from service.store.workers import WorkerHeartbeat, heartbeats
 
 j = tables.jobs.c
@@ -66,7 +67,7 @@ class StatisticsSnapshot:
     venues: list[VenueGauges]
     alarms: Mapping[str, int]
     ringing: list[ActiveAlarm]
-    trends: list[CameraTrend]
+    trends: list[AnchorRow]
     live: list[LiveGauges]
     # Seconds that a schedule has been due at most: where its cameras answer, and where they are slow or gave no frame.
     schedules_late_s: tuple[float, float]

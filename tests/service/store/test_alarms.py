@@ -105,35 +105,12 @@ def test_what_was_not_calibrated_for_long_rings_without_anything_happening(stock
     assert told(stock)[2:] == [("not-calibrated", "began")]
 
 
-def test_the_alarm_of_a_camera_goes_on_while_the_venues_rings_and_the_camera_is_no_better(stock):
-    watched(stock, rejected_in_a_row=2)
-    for _ in range(2):
-        stock.calibrated("v", accepted=("right",))
-    assert rings(stock) == [("rejected-in-a-row", "left")]
-    for _ in range(2):
-        stock.calibrated("v", accepted=False)
-    assert sorted(rings(stock), key=str) == [("rejected-in-a-row", "left"), ("rejected-in-a-row", None)]
-    assert told(stock) == [("rejected-in-a-row", "began")] * 2
-    stock.calibrated("v", accepted=("right",))
-    assert rings(stock) == [("rejected-in-a-row", "left")]
-    stock.calibrated("v")
-    assert rings(stock) == []
-    assert told(stock)[2:] == [("rejected-in-a-row", "ended")] * 2
-
-
 def test_an_alarm_names_the_setting_that_it_goes_by(stock):
     watched(stock, rejected_in_a_row=1)
     stock.calibrated("v", accepted=False)
     (alarm,) = stock.venues.health("v").alarms
     assert (alarm.setting, getattr(Rules(rejected_in_a_row=1), alarm.setting)) == ("rejected_in_a_row", 1)
     assert stock.alarms_told()[0].data.setting == "rejected_in_a_row"
-
-
-def test_a_rule_that_is_taken_away_ends_its_alarm(stock):
-    watched(stock, rejected_in_a_row=1)
-    stock.calibrated("v", accepted=False)
-    watched(stock, rejected_in_a_row=2)
-    assert (rings(stock), told(stock)[-1]) == ([], ("rejected-in-a-row", "ended"))
 
 
 @in_both_homes

@@ -6,7 +6,7 @@ import sqlalchemy as sa
 
 from service.pages.venues import venue_rows
 from service.schemas.health import Alarms
-from service.store.statistics.venue_summary import IN_CURVE
+from service.store.statistics.venue_quality import IN_CURVE
 from testbed.homes import in_both_homes
 
 

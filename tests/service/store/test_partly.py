@@ -42,23 +42,6 @@ def test_only_the_poses_that_are_accepted_are_stored(stock):
     assert stock.jobs.get(job).result.verdict == "partly"
 
 
-def test_a_dry_run_stores_none_of_them(stock):
-    stock.venue("v")
-    partly(stock, dry_run=True)
-    assert standing(stock) == BEFORE
-
-
-def test_a_venue_that_was_changed_meanwhile_takes_none_of_them(stock):
-    stock.venue("v")
-    running = stock.attempts.begin(stock.submitted("v"))
-    stock.moved_by_hand("v", -3.0)
-    stock.attempts.finish(running, result(running.venue, ["left"]), [])
-    told_of = stock.jobs.get(running.job_id).result
-    assert (told_of.verdict, told_of.accepted_cameras) == ("rejected", [])
-    assert told_of.cameras[0].rejected_because == "the venue was changed while the job ran"
-    assert told_of.cameras[1].rejected_because == "the lines do not fit"
-
-
 # By hand
 
 

@@ -6,7 +6,7 @@ import pytest
 import sqlalchemy as sa
 
 from service.schemas.health import Alarms
-from service.store import tables, trends
+from service.store import tables, venue_fold
 from testbed.homes import in_both_homes
 from tests.trending import SIGMA_M, displacement, night, nights, noisy
 
@@ -192,7 +192,7 @@ def test_many_jobs_of_one_day_are_one_night(stock):
 
 @in_both_homes
 def test_of_too_many_rows_the_last_of_each_day_and_the_newest_days_are_kept(stock, monkeypatch):
-    monkeypatch.setattr(trends, "KEPT_ROWS", 4)
+    monkeypatch.setattr(venue_fold, "KEPT_NIGHTS", 4)
     for number in range(6):
         night(stock, displacement(0.01), at=AUTUMN + timedelta(hours=8 * number))
     # The newest row is kept beside those that were too many when it came.
@@ -203,7 +203,7 @@ def test_of_too_many_rows_the_last_of_each_day_and_the_newest_days_are_kept(stoc
 
 @pytest.mark.long
 def test_what_is_usual_outlives_the_nights_that_it_was_learnt_from(stock, monkeypatch):
-    monkeypatch.setattr(trends, "KEPT_ROWS", 25)
+    monkeypatch.setattr(venue_fold, "KEPT_NIGHTS", 25)
     nights(stock, 60, AUTUMN, noisy(3, lambda number: 0.0008 * number))
     assert len(trend(stock).points) == 25
     assert trend(stock).state != "quiet"
