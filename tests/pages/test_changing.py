@@ -25,6 +25,7 @@ def cameras_of(stub, name):
     return {camera["id"]: camera for camera in stub.http.get(f"/venues/{name}").json()["cameras"]}
 
 
+@pytest.mark.long
 def test_a_knocked_camera_gets_a_new_first_pose_and_the_others_keep_theirs(stub, visit, demo):
     before = cameras_of(stub, demo)
     page = visit(stub.url, f"/ui/venues/{demo}/first-pose")

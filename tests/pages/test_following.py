@@ -88,6 +88,7 @@ def test_a_switch_and_the_focus_stay_where_they_are_when_a_part_is_shown_anew(st
     wait_until(page, "document.activeElement.tagName === 'A'")
 
 
+@pytest.mark.long
 def test_pages_say_that_the_service_is_away_and_go_on_when_it_is_back(tmp_path, visit):
     service = Service(tmp_path / "coming-back", "serve")
     service.venue("patient")

@@ -108,6 +108,7 @@ def other_browser(missing, tmp_path_factory):
         yield running
 
 
+@pytest.mark.long
 def test_firefox_shows_and_takes_a_turned_picture_as_it_is_stored(stub, other_browser, file):
     stub.venue("held")
     other_browser.goto(f"{stub.url}/ui/venues/held/calibrate")

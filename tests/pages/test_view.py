@@ -33,6 +33,7 @@ def settled(page):
     return look(page.locator("#view-picture"))
 
 
+@pytest.mark.long
 def test_the_picture_follows_the_knobs_and_the_seam_can_be_seen(stub, pitch, visit):
     page = visit(stub.url, f"/ui/venues/{pitch}#view")
     page.locator("#view-picture").scroll_into_view_if_needed()
@@ -54,6 +55,7 @@ def test_the_picture_follows_the_knobs_and_the_seam_can_be_seen(stub, pitch, vis
     assert grave(page) == []
 
 
+@pytest.mark.long
 def test_a_view_is_kept_and_its_package_fetched(stub, pitch, visit):
     page = visit(stub.url, f"/ui/venues/{pitch}#view")
     page.get_by_label("Projection").select_option("cylinder")
@@ -93,6 +95,7 @@ def test_a_view_is_not_kept_over_what_somebody_else_has_changed(stub, visit):
     assert stub.http.get("/venues/shared").json()["view"] is None
 
 
+@pytest.mark.long
 def test_a_view_without_its_frames_says_so(stub, visit):
     job = stub.calibrated(stub.venue("bare"))
     stub.venue("bare", cameras=("left", "third"))

@@ -39,6 +39,7 @@ def test_workers_of_both_versions_compute_what_apis_of_both_submit_and_an_upgrad
         assert len(new.http.get(f"/venues/{name}/history").json()["revisions"]) == 2
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("command", "shown"),
     [

@@ -37,6 +37,7 @@ def parts(files, **options):
 BOARD_OPTIONS = {"columns": 9, "rows": 6, "square_m": 0.03}
 
 
+@pytest.mark.long
 def test_photos_of_a_board_become_a_lens(service, photos):
     answer = service.http.post("/intrinsics", files=parts(photos, board=BOARD_OPTIONS))
     job = answer.json()
@@ -206,6 +207,7 @@ def test_esc_goes_from_photos_and_clicks_to_a_venue(tmp_path, photos):
     assert not (tmp_path / "no.json").exists()
 
 
+@pytest.mark.long
 def test_esc_says_which_cameras_had_their_points_exchanged(tmp_path):
     wide = replace(LENS, matrix=LENS.matrix * [[0.9], [0.9], [1]] + [[0, 0, 97], [0, 0, 53], [0, 0, 0]])
     seen = {"left": LENS, "right": wide}

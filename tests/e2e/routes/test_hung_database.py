@@ -65,6 +65,7 @@ def test_who_follows_a_venue_hears_within_seconds_that_the_database_is_away(star
             assert asked(service, "/venues/v/events")[0].status_code == 503
 
 
+@pytest.mark.long
 @on_servers
 def test_a_restarted_database_costs_no_request_that_comes_after_it(start, home):
     service = start("serve", ESC_AUTH="off")

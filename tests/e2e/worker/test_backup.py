@@ -64,6 +64,7 @@ def test_what_was_backed_up_while_it_ran_is_there_after_the_restore(start, shell
     assert service.calibrated("v", 1)["status"] == "succeeded"
 
 
+@pytest.mark.long
 @on_servers
 def test_a_dump_and_a_copy_of_the_bucket_make_the_service_again_elsewhere(start, home, shell, tmp_path):
     service = start("up").ready()

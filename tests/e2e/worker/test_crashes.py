@@ -97,6 +97,7 @@ def test_a_submission_killed_at_any_moment_is_one_job_or_none(start):
     settle(service)
 
 
+@pytest.mark.long
 def test_a_killed_service_leaves_no_process_and_goes_on_when_it_is_back(start):
     service = start(cold=True).ready()
     job = service.submitted(service.venue("v", "accept 2"))

@@ -350,6 +350,7 @@ def fire_until_a_job_waits(home):
     duty.finish()
 
 
+@pytest.mark.long
 def test_many_silent_cameras_of_a_host_hold_up_no_live_one_the_first_time(roomy, monkeypatch):
     monkeypatch.setattr(scheduler, "QUICK_S", 2.0)
     fetched_from, camera = quick_fetches(roomy, monkeypatch), NetworkCamera()
