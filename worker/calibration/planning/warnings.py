@@ -76,8 +76,9 @@ def _of_camera(planned: Plan, one: CameraPlan) -> Iterator[PlanWarning]:
             f"nearly all measured lines run the same way, only {across:.0%} across it: the camera may slide along "
             "them; let a line across into view",
         )
-    yield from _resolution(planned, one)
-    yield from _dominant_errors(planned, one)
+    if one.seen.any():
+        yield from _resolution(planned, one)
+        yield from _dominant_errors(planned, one)
 
 
 def _share_across(one: CameraPlan) -> float:
