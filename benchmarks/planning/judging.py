@@ -13,12 +13,16 @@ from benchmarks.planning.venues import BuiltVenue
 from benchmarks.printing import rms, table_head
 from benchmarks.truth import apart
 from worker.calibration.geometry.camera import Array, Camera
+from worker.calibration.geometry.derivatives import change_between
 from worker.calibration.geometry.far_marking import on_the_ground
 from worker.calibration.geometry.field import Field
 from worker.calibration.planning.line_state import STATES, LineState, StateName
-from worker.calibration.planning.plan import Plan, plan
+from worker.calibration.planning.plan import Plan, Planner
+from worker.calibration.refinement.expected_errors import ExpectedErrors
+from worker.calibration.refinement.uncertainty import Sigma
 
 QUANTITIES = {
+    "lines": "pose, without the known errors of lens and field",
     "rotation": "rotation of the pose",
     "position": "position of the pose",
     "refined rotation": "rotation of the refined pose",
@@ -29,7 +33,7 @@ QUANTITIES = {
 }
 
 
-ALIKE = (1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0)
+ALIKE = (1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0)
 """Numbers of neighbouring line points whose errors may be the same."""
 
 
@@ -44,29 +48,24 @@ class Ratio:
 
 def chosen_states(venues: Sequence[BuiltVenue]) -> Iterator[str]:
     """Yield the noise model that the choosing half of the venues speaks for, a row for each state."""
-    half = [venue for venue in venues if venue.chooses]
-    yield table_head("state | cameras | points of lines measured, by width in px | measured")
-    shares = {}
+    yield table_head("state | cameras | points of lines measured, by width in px | measured | alike")
     for state in STATES:
-        each = [one for venue in half if venue.state == state for one in calibrated(venue) if one.accepted]
+        half = [venue for venue in venues if venue.chooses and venue.state == state]
+        each = [one for venue in half for one in calibrated(venue) if one.accepted]
         if not each:
             continue
         expected, measured = (np.sum([getattr(one, name) for one in each], axis=0) for name in ("expected", "measured"))
         classes = zip(pairwise(WIDTHS_PX), measured, expected, strict=True)
         widths = [f"{low:g} to {high:g}: {found / of:.0%}" for (low, high), found, of in classes if of]
-        shares[state] = float(measured.sum() / expected.sum())
-        yield f"| {state} | {len(each)} | {', '.join(widths)} | {shares[state]:.2f} |"
-    misfit = {
-        alike: _misfit(half, {state: LineState(share, alike) for state, share in shares.items()}) for alike in ALIKE
-    }
-    yield f"\nPoints that err alike: {min(misfit, key=misfit.__getitem__):g}."
-
-
-def _misfit(venues: Sequence[BuiltVenue], states: dict[StateName, LineState]) -> float:
-    """Return how far the ratios of all quantities are from 1: the sum of the squares of their logarithms."""
-    found = [ratio for venue in venues for ratio in _ratios(venue, states)]
-    by_quantity = [rms([ratio.value for ratio in found if ratio.quantity == quantity]) for quantity in QUANTITIES]
-    return float(np.sum(np.log(by_quantity) ** 2))
+        share = float(measured.sum() / expected.sum())
+        off = {
+            alike: [
+                r.value for v in half for r in _ratios(v, {state: LineState(share, alike)}) if r.quantity == "lines"
+            ]
+            for alike in ALIKE
+        }
+        nearest = min(off, key=lambda alike: abs(np.log(rms(off[alike]))))
+        yield f"| {state} | {len(each)} | {', '.join(widths)} | {share:.2f} | {nearest:g} |"
 
 
 def ratios(venues: Sequence[BuiltVenue], states: dict[StateName, LineState]) -> Iterator[str]:
@@ -91,19 +90,41 @@ def _rms_of(found: Sequence[Ratio], quantity: str) -> str:
 
 
 def _ratios(venue: BuiltVenue, states: dict[StateName, LineState]) -> Iterator[Ratio]:
-    planned = plan(venue.pitch, venue.cameras, states[venue.state])
+    planner = Planner(venue.pitch, venue.cameras, states[venue.state], 0.0)
+    planned = planner.plan()
     found = calibrated(venue)
+    counted = [
+        one.accepted and not is_other_minimum(one, expected.sigma)
+        for one, expected in zip(found, planned.cameras, strict=True)
+    ]
     for number, one in enumerate(found):
-        if one.accepted:
+        if counted[number]:
+            yield _by_lines(venue, planner.errors, number, one)
             yield from _of_camera(venue, planned, number, one)
     for pair in planned.pairs:
         ids = [camera.id for camera in venue.cameras]
         numbers = [ids.index(name) for name in (pair.first, pair.second)]
-        if all(found[number].accepted for number in numbers):
+        if all(counted[number] for number in numbers):
             truth = venue.ground(planned.xy)
             places = [_placed(venue, number, found[number].answered, truth) for number in numbers]
             off = np.linalg.norm(places[0] - places[1], axis=-1)[pair.seen]
             yield Ratio("stitch", rms(off[np.isfinite(off)]) / pair.stitch_m, pair.stitch_m)
+
+
+def _by_lines(venue: BuiltVenue, errors: ExpectedErrors, number: int, one: Calibrated) -> Ratio:
+    """Return how far a pose is off, but for how it follows the true errors of lens and field, by all six numbers."""
+    own = errors.unknowns.pose(number)
+    follows = (errors.response @ venue.parameter_errors(errors.unknowns.parameters))[own]
+    off = change_between(one.answered, venue.real[number]) - follows
+    covariance = errors.by_measurement[own, own]
+    value = np.sqrt(off @ np.linalg.solve(covariance, off) / len(off))
+    return Ratio("lines", float(value), Sigma.from_covariance(covariance).position_m)
+
+
+def is_other_minimum(one: Calibrated, expected: Sigma) -> bool:
+    """True if a calibration says itself that it is far less exact than planned: it ended on other lines than those of
+    its field, or beside its lens."""
+    return one.sigma[1] > 5 * expected.position_m
 
 
 def _of_camera(venue: BuiltVenue, planned: Plan, number: int, one: Calibrated) -> Iterator[Ratio]:

@@ -22,9 +22,12 @@ from worker.calibration.geometry.camera import Array, Camera, Frame, Pose
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.lens import LENS_PARAMETERS, SIGMA_NAMES, Intrinsics
 from worker.calibration.geometry.parameters import (
+    LensParameter,
+    Parameter,
     field_measures,
     lens_parameters,
     lens_parameters_without_heat,
+    lens_values,
     with_lens_changed,
 )
 from worker.calibration.planning.line_state import STATES, StateName
@@ -57,8 +60,25 @@ class BuiltVenue:
 
     @property
     def chooses(self) -> bool:
-        """True for the half of the venues of each state that chooses the noise model; the others judge it."""
-        return (self.number // len(STATES)) % 2 == 0
+        """True for the half of the venues of each sport and state that chooses the noise model; the others judge it."""
+        return (self.number // len(SPORTS) + self.number) % 2 == 0
+
+    def parameter_errors(self, parameters: Sequence[Parameter]) -> Array:
+        """Return the true errors (E,) of parameters of lenses and field: what is real minus what is believed."""
+        lenses = [
+            lens_values(real.intrinsics) - lens_values(camera.intrinsics)
+            for real, camera in zip(self.real, self.cameras, strict=True)
+        ]
+        field = {one.name: one.read(self.real_pitch) - one.read(self.pitch) for one in field_measures(self.pitch)}
+        return np.array(
+            [
+                # Heat, which has numbers beyond those of the cameras, is part of the lens.
+                (lenses[one.camera][LENS_PARAMETERS.index(one.name)] if one.camera < len(lenses) else 0.0)
+                if isinstance(one, LensParameter)
+                else field.get(one.name, 0.0)
+                for one in parameters
+            ]
+        )
 
     def frames(self) -> dict[str, list[Frame]]:
         """Return a frame of each camera, rendered once."""
@@ -105,8 +125,8 @@ def built_venue(number: int) -> BuiltVenue:
 def _errors(number: int) -> tuple[Array, Array]:
     """Return the errors of three lenses (3, 6) and of the measures of the field (3,), in sigmas.
 
-    Those of the venues of a half are quantiles of the normal distribution, in random order (a Latin hypercube): of
-    fifteen independent ones, some half would have a ridge that is a third farther off than said.
+    Those of fifteen venues are quantiles of the normal distribution, in random order (a Latin hypercube): of as many
+    independent ones, the ridges may all in all be a third farther off than said.
     """
     half, index = (number // len(STATES)) % 2, number // (2 * len(STATES)) * len(STATES) + number % len(STATES)
     rng = np.random.default_rng([47, half])

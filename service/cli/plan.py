@@ -22,7 +22,8 @@ def plan(
             metavar="SITE.json",
             exists=True,
             dir_okay=False,
-            help="A field, and for each camera a place, a direction, a lens and an image size; or the file of a venue.",
+            help="A field and its cameras (place, direction, lens, image size), or stands to propose cameras for; the "
+            "file of a venue will do.",
         ),
     ],
     output: Annotated[
@@ -44,8 +45,8 @@ def plan(
 ) -> None:
     """Plan cameras before they are mounted. Exit: 0 all can be calibrated, 1 failed, 2 usage, 3 not all.
 
-    It computes what each camera would see, how exactly a calibration would place it, a player and the next camera's
-    view, which lines decide that, and what more height or overlap would bring.
+    It computes how much each camera sees, how exact its pose and a player's place would be, how well neighbours stitch,
+    which lines decide that, and what more height or overlap would bring.
     """
     engine_settings()
     place = parse_document(PlannedSite, site.read_bytes(), str(site))

@@ -27,13 +27,13 @@ class LineState:
     """
 
     measured: float
-    alike: float = 4.0
+    alike: float
 
 
 STATES: Mapping[StateName, LineState] = {
-    "fresh": LineState(0.94),
-    "worn": LineState(0.81),
-    "night": LineState(0.82),
+    "fresh": LineState(0.92, 4.0),
+    "worn": LineState(0.81, 24.0),
+    "night": LineState(0.81, 16.0),
 }
 """States that `python -m benchmarks.planning --only states` measured in rendered frames, 22 players in each."""
 LEAST_WIDTH_PX = WIDTH_CLASSES_PX[0][0]

@@ -137,7 +137,7 @@ class Planner:
         self._ground = pitch.lift(self._xy)
         self._measured = [expect_measurements(self._lines, camera, state, hidden) for camera in cameras]
         self._model = ErrorModel(pitch, cameras)
-        self._errors = self._model.expect(self._measured)
+        self.errors = self._model.expect(self._measured)
         self._seen = [camera.sees(camera.project(self._ground)) for camera in cameras]
         self._jacobians = dict[int, Array]()
 
@@ -167,7 +167,7 @@ class Planner:
 
     def camera(self, number: int) -> CameraPlan:
         """Return the plan of one camera."""
-        camera, errors, seen = self._cameras[number], self._errors, self._seen[number]
+        camera, errors, seen = self._cameras[number], self.errors, self._seen[number]
         jacobian = self._by_ground(number)
         uneven_m = self._pitch.template.uneven
         poses = np.zeros_like(errors.as_given)
@@ -192,7 +192,7 @@ class Planner:
         """Return the plan of two cameras that see some of the same ground."""
         seen = self.both_see(first, second)
         here, there = (self._by_ground(number)[seen[self._seen[number]]] for number in (first, second))
-        stitch_m = sigmas(here - there, self._errors.as_given, self._pitch.template.uneven)
+        stitch_m = sigmas(here - there, self.errors.as_given, self._pitch.template.uneven)
         common = self._metres(np.intersect1d(self._measured[first].index, self._measured[second].index))
         names = self._cameras[first].id, self._cameras[second].id
         return PairPlan(*names, seen, float(np.sqrt(np.mean(stitch_m**2))), common)
@@ -205,7 +205,7 @@ class Planner:
         points = points[:: max(len(points) // 200, 1)]
         on_ground = self._jacobian(number, points)
         in_picture = pixel_jacobian(camera, points)[..., 3:5] @ on_ground
-        metres, pixels = (sigmas(one, self._errors.refined, 0.0) for one in (on_ground, in_picture))
+        metres, pixels = (sigmas(one, self.errors.refined, 0.0) for one in (on_ground, in_picture))
         return GroundSigma(metres, pixels)
 
     def _by_ground(self, number: int) -> Array:
@@ -221,7 +221,8 @@ class Planner:
     def _metres(self, index: NDArray[np.intp]) -> Array:
         """Return the length (K,) of each marking that is measured at line points `index` (M,), m."""
         points = np.bincount(self._lines.marking[index], minlength=len(self._pitch.markings()))
-        return points * self._lines.spacing * self._state.measured * (1 - self._hidden)
+        share = self._state.measured * (1 - self._hidden)
+        return np.asarray(points * (self._lines.spacing * share), dtype=float)
 
 
 def _on_map(seen: Mask, values: Array) -> Array:
@@ -234,5 +235,5 @@ def _on_map(seen: Mask, values: Array) -> Array:
 def _resolution(camera: Camera, points: Array) -> tuple[Array, Array]:
     """Return the pixels (N,) per metre of ground at points (N, 3), in the directions of most and least of them."""
     by_ground = -pixel_jacobian(camera, points)[..., 3:5]
-    finest = np.linalg.svd(by_ground, compute_uv=False)
+    finest = np.asarray(np.linalg.svd(by_ground, compute_uv=False), dtype=float)
     return finest[:, 0], finest[:, 1]

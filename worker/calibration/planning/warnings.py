@@ -29,8 +29,6 @@ WarningKind = Literal[
 ]
 REFUSED: tuple[WarningKind, ...] = ("off-field", "few-lines", "undetermined")
 """Warnings of cameras whose calibration the gate would refuse."""
-MUCH = 0.3
-"""Share of what a camera sees from which a fault of it is worth a warning."""
 
 
 @dataclass(frozen=True)
@@ -78,8 +76,9 @@ def _of_camera(planned: Plan, one: CameraPlan) -> Iterator[PlanWarning]:
             f"nearly all measured lines run the same way, only {across:.0%} across it: the camera may slide along "
             "them; let a line across into view",
         )
-    yield from _resolution(planned, one)
-    yield from _dominant_errors(planned, one)
+    if one.seen.any():
+        yield from _resolution(planned, one)
+        yield from _dominant_errors(planned, one)
 
 
 def _share_across(one: CameraPlan) -> float:
@@ -92,7 +91,7 @@ def _share_across(one: CameraPlan) -> float:
 def _resolution(planned: Plan, one: CameraPlan) -> Iterator[PlanWarning]:
     seen = VisibleLines.from_camera(planned.pitch.line_points(), one.camera)
     thin = float(np.mean(seen.width_px < LEAST_WIDTH_PX))
-    if thin > MUCH:
+    if _is_much(thin):
         yield PlanWarning(
             "thin-lines",
             [one.camera.id],
@@ -102,7 +101,7 @@ def _resolution(planned: Plan, one: CameraPlan) -> Iterator[PlanWarning]:
     coarse = float(
         np.mean(one.px_per_metre_along[one.seen] < GATE.largest_ground_sigma_px / GATE.largest_ground_sigma_m)
     )
-    if coarse > MUCH:
+    if _is_much(coarse):
         yield PlanWarning(
             "coarse-ground",
             [one.camera.id],
@@ -110,6 +109,11 @@ def _resolution(planned: Plan, one: CameraPlan) -> Iterator[PlanWarning]:
             "line of sight, which is what a tracker's error of a pixel does to a player's place: stand higher, or take "
             "more pixels",
         )
+
+
+def _is_much(share: float) -> bool:
+    """True for a share of what a camera sees that is worth a warning."""
+    return share > 0.3
 
 
 def _dominant_errors(planned: Plan, one: CameraPlan) -> Iterator[PlanWarning]:

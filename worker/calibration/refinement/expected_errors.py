@@ -43,14 +43,18 @@ class ExpectedErrors:
         return np.asarray(np.linalg.inv(self.information[:poses, :poses] + self.pose_precision), dtype=float)
 
     @cached_property
+    def response(self) -> Array:
+        """Change (6 C, E) of the poses that least squares finds when parameters of lenses and field change."""
+        return np.asarray(-self.by_measurement @ self.information[: self._poses, self._poses :], dtype=float)
+
+    @cached_property
     def as_given(self) -> Array:
         """Covariance (D, D) of the poses that are answered for lenses and field as given, with the errors of those.
 
         The poses follow an error of lens or field as least squares does (docs/model.md, 5).
         """
         poses = self._poses
-        response = -self.by_measurement @ self.information[:poses, poses:]
-        follow = np.concatenate([response, np.eye(len(self.variance))])
+        follow = np.concatenate([self.response, np.eye(len(self.variance))])
         covariance = (follow * self.variance) @ follow.T
         covariance[:poses, :poses] += self.by_measurement
         return np.asarray(covariance, dtype=float)

@@ -76,10 +76,10 @@ def test_a_calibration_errs_by_what_was_expected():
     known = dict.fromkeys(("skew_m", "length_m", "width_m", "ridge_height_m"), 0.001)
     hall = Field(40.0, 20.0, 0.05, None, load("handball"), sigma=known)
     one = aimed("hall", (-4.0, -19.0, 6.0), (-8.0, 0.0))
-    measured = expect_measurements(hall.line_points(), one, LineState(1.0, alike=1.0))
+    measured = expect_measurements(hall.line_points(), one, LineState(1.0, 1.0))
     sigma = ErrorModel(hall, [one]).expect([measured]).as_given
     off = []
-    for _ in range(6):
+    for _ in range(4):
         painted = Painted.drawn(hall, rng)
         real = with_lens_changed(one, np.array([p.expected * rng.normal() for p in lens_parameters([one])]))
         sight = SimulatedSight(painted, [real], 0.2 * rng.normal(size=(1, len(painted.lines))))
