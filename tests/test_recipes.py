@@ -5,7 +5,6 @@ import json
 import re
 import subprocess
 import sys
-import tomllib
 import zipfile
 from pathlib import Path
 
@@ -15,7 +14,7 @@ import pytest
 import yaml
 
 from service.cli.tracked_poses import camera_document
-from service.formats import colmap, metropolis, plain, pose2sim
+from service.formats import colmap, metropolis, plain
 from service.formats.lens import NumberedCamera
 from service.schemas.field import FieldOfPlay
 from service.schemas.programs.stitching import StitchRequest
@@ -101,23 +100,6 @@ def test_colmap_triangulates_points_of_the_ground_with_our_poses(tmp_path, missi
     assert len(points) > 100
     assert np.median(np.abs(points[:, 2])) < 0.03
     assert {image.name for image in model.images.values()} == {"west.jpg", "east.jpg"}
-
-
-def test_caliscope_reads_what_sed_makes_of_the_file_for_pose2sim(tmp_path):
-    shots = numbered(pair())
-    (tmp_path / "Calib_esc.toml").write_bytes(pose2sim.write(shots))
-    subprocess.run(["sh", "-c", code("Pose2Sim, anipose and Caliscope", "sh")], cwd=tmp_path, check=True)
-    # As `load_camera_array` of Caliscope reads it.
-    cameras = tomllib.loads((tmp_path / "camera_array.toml").read_text())["cameras"]
-    assert [int(name) for name in cameras] == [1, 2]
-    for shot, table in zip(shots, cameras.values(), strict=True):
-        assert tuple(table["size"]) == shot.size
-        assert table["fisheye"] is False
-        assert np.array(table["matrix"]).shape == (3, 3)
-        rotation, _ = cv2.Rodrigues(np.array(table["rotation"], dtype=np.float64))
-        np.testing.assert_allclose(rotation, shot.rotation, atol=1e-12)
-        np.testing.assert_allclose(table["translation"], shot.camera.pose.translation)
-        np.testing.assert_allclose(table["distortions"], BARREL)
 
 
 def test_pictures_without_distortion_are_those_of_the_camera_matrix_of_metropolis(tmp_path):

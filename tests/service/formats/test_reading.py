@@ -1,6 +1,7 @@
 """Calibrations of every format are read back as they were written, and by their tools' own readers as well."""
 
 import json
+import tomllib
 import zipfile
 from dataclasses import replace
 
@@ -180,6 +181,20 @@ def test_what_opencv_itself_writes_is_read(tmp_path, end):
     np.testing.assert_allclose(camera.intrinsics.matrix, matrix)
     np.testing.assert_allclose(camera.pose.rotation, rvec, atol=1e-9)
     np.testing.assert_allclose(camera.pose.translation, [1, 2, 30])
+
+
+def test_caliscope_finds_in_its_camera_array_what_it_looks_for():
+    pose = Pose.from_position([1.6, 0.3, -0.4], [-1.0, -49.0, 8.0])
+    lens = Intrinsics(matrix=[[900, 0, 959.5], [0, 900, 539.5], [0, 0, 1]], distortion=[-0.3, 0.1, 0, 0, 0])
+    (content,) = written("caliscope", [CameraRecord(name, lens, (1920, 1080), pose) for name in ("a", "b")]).values()
+    cameras = tomllib.loads(content.decode())["cameras"]
+    assert [int(name) for name in cameras] == [table["cam_id"] for table in cameras.values()] == [1, 2]
+    for table in cameras.values():
+        assert (table["size"], table["fisheye"]) == ([1920, 1080], False)
+        assert np.array(table["matrix"]).shape == (3, 3)
+        assert len(table["distortions"]) == 5
+        np.testing.assert_allclose(table["rotation"], pose.rotation)
+        np.testing.assert_allclose(table["translation"], pose.translation)
 
 
 # Scaling and cropping
