@@ -394,7 +394,7 @@ def _write_difference(connection: sa.Connection, table: sa.Table, before: Rows, 
         (sa.insert(table), [dict(row) for key, row in after.items() if key not in before]),
         (
             sa.update(table).where(*is_row),
-            [key_of(row) | row for key, row in after.items() if key in before and row != before[key]],
+            [{**key_of(row), **row} for key, row in after.items() if key in before and row != before[key]],
         ),
     ]
     for statement, rows in statements:

@@ -176,8 +176,8 @@ class VenueRepository(Repository):
             venue = find_venue(connection, venue_id)
             if venue is not None:
                 changes = with_alarms(load(connection, venue_id), venue)
-                write_changes(connection, changes)
                 live_alarms.plan_next(connection, venue_id, changes.after.now)
+                write_changes(connection, changes)
 
     def postpone_alarms(self, venue_id: str) -> None:
         """Postpone the alarms of a venue that cannot be read by `UNREADABLE_RETRY`."""
@@ -371,8 +371,8 @@ def store_venue(
     """
     memories = newest_memories(connection, venue.id)
     changes = with_venue_put(load(connection, venue.id), stored, venue, memories, cause, by, job_id)
-    write_changes(connection, changes)
     plan_schedule(connection, venue)
+    write_changes(connection, changes)
 
 
 def restore_state(

@@ -58,8 +58,8 @@ def calibrations(connection: sa.Connection, venue_id: str, count: int) -> None:
             }
         )
         if number >= count - IN_CURVE:
-            now = load(connection, venue_id).with_state(now=at)
-            write_changes(connection, with_calibration_end(now, "succeeded", found, dry_run=False))
+            changes = load(connection, venue_id).with_state(now=at)
+            write_changes(connection, with_calibration_end(changes, "succeeded", found, dry_run=False))
     connection.execute(sa.insert(tables.jobs), rows)
 
 

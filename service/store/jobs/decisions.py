@@ -86,8 +86,8 @@ class DecisionRepository(Repository):
             memories = _without_refused(newest_memories(connection, began_with.id), result, chosen)
             changes = with_calibration(changes, result, moved=True)
             changes = with_result_in_use(changes, stored, result, chosen, "accepted", job_id, memories, by)
-            write_changes(connection, changes)
             _touch(connection, job_id)
+            write_changes(connection, changes)
 
     def reject(self, job_id: str, by: Actor | None = None) -> None:
         """Put back what was before a calibration's poses held; nothing to do if they never did or were put back.
@@ -104,8 +104,8 @@ class DecisionRepository(Repository):
                 stored = find_replaceable(connection, began_with.id)
                 assert stored is not None
                 before = revision_before(connection, began_with.id, job_id)
-                restore_state(connection, stored, before, by, job_id)
                 _touch(connection, job_id)
+                restore_state(connection, stored, before, by, job_id)
 
 
 def _found(connection: sa.Connection, job_id: str) -> tuple[Venue, Result, Revision | None]:
