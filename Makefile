@@ -28,7 +28,7 @@ $(VENV)/.installed: $(VENV)/.runtime
 # Compiled files are kept even where the machine says not to: each of hundreds of processes would compile them anew.
 PYTEST := PYTHONDONTWRITEBYTECODE= $(BIN)/pytest --numprocesses=auto --dist=worksteal
 
-# Every behaviour, once: five minutes of two cores.
+# Every behaviour once; its accuracy and other parameters are left to `make test-long`.
 test: setup
 	$(PYTEST) -m "not long"
 
