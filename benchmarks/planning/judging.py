@@ -17,7 +17,7 @@ from worker.calibration.geometry.derivatives import change_between
 from worker.calibration.geometry.far_marking import on_the_ground
 from worker.calibration.geometry.field import Field
 from worker.calibration.planning.line_state import STATES, LineState, StateName
-from worker.calibration.planning.plan import Plan, Planner
+from worker.calibration.planning.plan import Plan, Planner, plan
 from worker.calibration.refinement.expected_errors import ExpectedErrors
 from worker.calibration.refinement.uncertainty import Sigma
 
@@ -82,6 +82,18 @@ def ratios(venues: Sequence[BuiltVenue], states: dict[StateName, LineState]) -> 
         unit = "°" if "rotation" in quantity else " cm"
         median = np.median(predicted) * (1 if unit == "°" else 100)
         yield f"| {words} | {' | '.join(columns)} | {median:.3g}{unit} |"
+    yield ""
+    yield from _left_out(venues, states)
+
+
+def _left_out(venues: Sequence[BuiltVenue], states: dict[StateName, LineState]) -> Iterator[str]:
+    """Yield a line for each camera that no ratio counts."""
+    for venue in venues:
+        planned = plan(venue.pitch, venue.cameras, states[venue.state])
+        for one, expected in zip(calibrated(venue), planned.cameras, strict=True):
+            if not one.accepted or is_other_minimum(one, expected.sigma):
+                why = f"sigma {100 * one.sigma[1]:.0f} cm" if one.accepted else "refused"
+                yield f"Not counted: venue {venue.number}, {expected.camera.id}, {why}."
 
 
 def _rms_of(found: Sequence[Ratio], quantity: str) -> str:
