@@ -38,9 +38,10 @@ def rank_readings(pitch: Field, cameras: Sequence[Camera], views: Sequence[LineV
 
     All cameras of a file are written in one convention: they are scored together.
     """
-    every, half_sides = list(readings()), np.array([pitch.length, pitch.width]) / 2
+    field_map, half_sides = FieldMap.of(pitch), np.array([pitch.length, pitch.width]) / 2
+    # On a symmetric field half a turn changes nothing: the file at its word would be tried once more.
+    every = [one for one in readings() if not (field_map.is_symmetric and one.is_half_turn)]
     cost = COST_OF_A_CAUSE * np.array([len(reading.causes) for reading in every])
-    field_map = FieldMap.of(pitch)
     poses = [[reading.pose(camera.pose, half_sides) for reading in every] for camera in cameras]
     filming = [
         np.array([films_the_field(pitch, camera.with_pose(pose)) for pose in its])

@@ -63,6 +63,11 @@ class Reading:
         return Pose(rotation_vectors(world_to_camera), place)
 
     @property
+    def is_half_turn(self) -> bool:
+        """True if all that it changes is half a turn about the middle of the field."""
+        return self.causes == ("world-axes",) and np.array_equal(self.axes, np.diag([-1.0, -1.0, 1.0]))
+
+    @property
     def words(self) -> tuple[str, ...]:
         """The causes in words."""
         return tuple(self._words(cause) for cause in self.causes)
