@@ -15,7 +15,7 @@ from service.schemas.base import TOLERANTLY
 from service.schemas.events.webhooks import Webhook
 from service.schemas.history import Cause
 from service.schemas.job import JobError, Progress
-from service.schemas.names import OPEN_STATUSES, JobStatus
+from service.schemas.names import OPEN_STATUSES, JobKind, JobStatus
 from service.schemas.options import Handling, Options
 from service.schemas.refusals import refuse
 from service.schemas.results import AnyResult, Result
@@ -72,7 +72,7 @@ class JobState:
     """
 
     id: str
-    kind: str
+    kind: JobKind
     options: Handling
     created_at: datetime
     started_at: datetime | None
