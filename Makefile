@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: setup demo test test-fast test-long format check wheel bench bench-find bench-knocked bench-confidence bench-plan bench-check bench-real bench-cost bench-fields bench-segmentation bench-truth bench-service bench-faults bench-hostile bench-rate bench-versions bench-video bench-follow bench-live bench-learned train lock clean
+.PHONY: setup demo test test-fast test-long coverage format check wheel bench bench-find bench-knocked bench-confidence bench-plan bench-check bench-real bench-cost bench-fields bench-segmentation bench-truth bench-service bench-faults bench-hostile bench-rate bench-versions bench-video bench-follow bench-live bench-learned train lock clean
 
 # What runs, without what tests, checks and clips need on top: a third of the size. Compiled where it is first imported.
 $(VENV)/.runtime: docker/requirements.lock requirements.lock pyproject.toml
@@ -40,6 +40,13 @@ test-fast: setup
 # What CI runs after `make test`: proofs of accuracy, second parameters, a year of a venue; CONTRIBUTING.md says which.
 test-long: setup
 	$(PYTEST) -m long
+
+# Lines and branches that `make test` reaches, by rooms. By files, with the lines that nothing reaches: .venv/bin/coverage report
+coverage: setup
+	$(BIN)/coverage erase
+	PYTHONDONTWRITEBYTECODE= $(BIN)/coverage run -m pytest --numprocesses=auto --dist=worksteal -m "not long" $(TESTS)
+	$(BIN)/coverage combine --quiet
+	$(BIN)/python -m tests.coverage_by_room
 
 # What `make check` says of layout and imports, mended.
 format: setup

@@ -1,11 +1,14 @@
 """What a worker asks the database about the jobs that it computes."""
 
 import time
+from datetime import UTC, datetime, timedelta
 
 import pytest
 import sqlalchemy as sa
 
 from service.schemas.job import Progress
+from service.store import tables
+from service.store.silence import silent_jobs
 from testbed.homes import in_both_homes
 from worker import lease
 from worker.lease import JobTimeoutError, LeaseLostError, Leases
@@ -97,3 +100,23 @@ def test_an_attempt_that_has_had_its_time_does_not_go_on(stock):
         time.sleep(0.1)
         with pytest.raises(JobTimeoutError):
             held.check()
+
+
+def test_a_lease_is_renewed_however_often_it_is_asked_about(stock, monkeypatch):
+    now = [100.0]
+    monkeypatch.setattr(lease.time, "monotonic", lambda: now[0])
+    task = stock.attempts.begin(stock.submitted("v"))
+    with Leases(stock.attempts).begin(task, 60.0) as held:
+        held.check()
+        with stock.engine.begin() as connection:
+            connection.execute(sa.update(tables.jobs).values(updated_at=datetime.now(UTC) - timedelta(minutes=1)))
+        assert silent(stock) == [task.job_id]
+        for _ in range(4):
+            now[0] += lease.BEAT_S / 2
+            held.check()
+        assert silent(stock) == []
+
+
+def silent(stock) -> list[str]:
+    with stock.engine.connect() as connection:
+        return silent_jobs(connection, datetime.now(UTC), 30.0)

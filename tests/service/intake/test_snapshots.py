@@ -25,3 +25,14 @@ def test_the_program_that_fetches_frames_sees_no_secret_of_the_service(monkeypat
     inherited = json.loads(seen.read_text())
     assert {"PATH", "OMP_NUM_THREADS"} <= inherited.keys()
     assert not inherited.keys() & set(secrets)
+
+
+def test_why_a_camera_gave_no_frame_is_told_without_its_password(tmp_path):
+    answer = {"camera": "left", "why": "rtsp://user:secret@10.1.0.7/live?pwd=hidden: no route to host", "seconds": 0.1}
+    settings = Settings(source_program=[sys.executable, "-c", f"print({json.dumps(json.dumps(answer))})"])
+    (camera, _) = VenueIn.model_validate(venue("v")).to_venue().cameras
+    seen = camera.model_copy(update={"source": "rtsp://***@10.1.0.7/live?pwd=***"})
+    with pytest.raises(Problem, match="no route to host") as problem:
+        Snapshots(settings, lambda _: None).take(seen, {"left": "user:secret?pwd=hidden"})
+    assert "secret" not in problem.value.detail
+    assert "hidden" not in problem.value.detail

@@ -74,6 +74,17 @@ def test_the_seed_is_the_callers_or_one_is_chosen_and_told(service, name):
     assert service.calibrated(name, 1)["result"]["provenance"]["seed"] >= 0
 
 
+def test_the_same_frames_of_other_cameras_are_other_content(service, name):
+    service.venue(name)
+    frames = [png(shade=shade) for shade in (1, 2, 3)]
+    sent = [("left", frames[0]), ("right", frames[1]), ("right", frames[2])]
+    exchanged = [("left", frames[0]), ("left", frames[1]), ("right", frames[2])]
+    job = service.http.post(f"/venues/{name}/calibrate", files=sent).json()["id"]
+    answer = service.http.post(f"/venues/{name}/calibrate", files=exchanged)
+    assert (answer.status_code, answer.json()["type"]) == (409, "/problems/venue-busy")
+    assert service.http.post(f"/venues/{name}/calibrate", files=sent).json()["id"] == job
+
+
 @in_both_homes
 def test_the_same_frames_give_the_running_job_back_and_others_a_conflict(service, name):
     job = service.submitted(service.venue(name, "accept 2"))

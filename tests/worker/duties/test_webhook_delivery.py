@@ -279,6 +279,19 @@ def test_workers_that_look_at_once_do_not_attempt_the_same(stock, clock):
     assert len({delivery.id for delivery in attempts}) == 3
 
 
+def test_an_attempt_that_was_overtaken_by_the_next_one_writes_nothing(stock, clock):
+    home = stock()
+    ended(home, "https://example.com/")
+    (slow,) = home.outbox.claim_due(clock.now, clock.now, 1)
+    (next_one,) = home.outbox.claim_due(clock.now, clock.now + ATTEMPT, 1)
+    home.outbox.give_up(slow, "no answer")
+    home.outbox.retry_later(slow, clock.now, "no answer")
+    assert home.callbacks() == {"waiting": 1}
+    assert home.outbox.claim_due(clock.now, clock.now + ATTEMPT, 1) == []
+    home.outbox.mark_delivered(next_one)
+    assert home.callbacks() == {"delivered": 1}
+
+
 def test_a_worker_without_a_secret_sends_nothing_unsigned(stock, receiver, clock):
     home, hook = stock(webhook_secret=None), receiver()
     ended(home, hook.url)

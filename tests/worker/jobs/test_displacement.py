@@ -9,6 +9,7 @@ from service.schemas.geometry import PosedCamera
 from service.schemas.trend import Anchor
 from testbed.synthetic import PITCH, camera
 from tests.worker.calibration.gate.good_result import good
+from worker.calibration.gate.displacement import measure_displacement
 from worker.calibration.geometry.camera import Pose
 from worker.calibration.refinement.uncertainty import Deviation
 from worker.jobs.to_schemas import displacement_to_schema, lens_to_schema, pose_to_schema
@@ -32,6 +33,14 @@ def test_a_camera_is_compared_with_its_anchor():
     assert (told["anchor"], told["rotation_deg"], told["position_m"]) == (3, 0.0, pytest.approx(0.05))
     assert np.hypot(told["across_m"], told["away_m"]) == pytest.approx(0.05)
     assert told["sigma_across_m"] >= told["repeatability_across_m"] > 0
+
+
+def test_what_is_known_of_a_displacement_is_told_of_the_direction_that_it_is_known_in():
+    moved = measure_displacement(PITCH, CAMERA, found(by=(0.03, 0.04, 0.0)))
+    told = displacement_to_schema(PITCH, found(by=(0.03, 0.04, 0.0)), ANCHOR)
+    for name, known in {"": moved.shift, "sigma_": moved.sigma, "repeatability_": moved.repeatability}.items():
+        assert (told[f"{name}across_m"], told[f"{name}away_m"]) == pytest.approx(tuple(known))
+        assert known[0] != pytest.approx(known[1])
 
 
 def test_a_camera_without_an_anchor_is_its_own():

@@ -15,6 +15,7 @@ import pytest
 
 from service.intake.snapshots import Snapshots
 from service.schemas.problems import Problem
+from service.schemas.programs.sources import SourceTask
 from service.schemas.venue import VenueIn
 from service.settings import Settings
 from testbed.parameters import try_first
@@ -23,6 +24,7 @@ from tests.listener import Parrot
 from tests.worker.certificates import certificate
 from tests.worker.receiver import TELLTALE
 from tests.worker.sources.streaming_camera import ASKS, SIZE, Film, Stranger, StreamingCamera
+from worker.programs import snapshot
 from worker.sources.rtsp_relay import Relay
 
 pytestmark = pytest.mark.slow
@@ -85,6 +87,9 @@ def test_a_camera_that_signed_its_own_certificate_is_taken_from_by_the_pin_that_
     assert "cannot be verified (self-signed certificate)" in said
     assert seen.asked == []
     assert taken(tmp_path, f"rtsps://***@{seen.host}/live{pin}", RIGHT)
+    name, _, digits = pin.partition("=")
+    as_cameras_show_it = ":".join(re.findall("..", digits.upper()))
+    assert taken(tmp_path, f"rtsps://***@{seen.host}/live{name}={as_cameras_show_it}", RIGHT)
     asked = len(seen.asked)
     assert pin in refused(tmp_path, f"rtsps://***@{seen.host}/live#tls_sha256={'0' * 64}", RIGHT)
     assert len(seen.asked) == asked
@@ -226,3 +231,19 @@ def test_nothing_that_the_host_of_a_source_says_is_read_through_its_refusal(tmp_
         taken(tmp_path, f"http://{listener.host}/picture", userinfo)
     assert "hunter2" not in refusal.value.detail
     assert "bytearray" not in refusal.value.detail
+
+
+def test_of_a_name_with_several_addresses_those_alone_are_called_that_are_permitted(tmp_path, monkeypatch):
+    task = SourceTask(
+        sources={}, allowed=["10.1.0.0/16"], folder=str(tmp_path), seconds=1.0, most_bytes=1000, most_pixels=1000
+    )
+    called = []
+
+    async def fetch_picture(_, addresses, *__):
+        called.extend(addresses)
+        return b"a picture"
+
+    monkeypatch.setattr(snapshot.outbound_guard, "look_up", lambda _: ["169.254.169.254", "10.1.0.7", "10.2.0.7"])
+    monkeypatch.setattr(snapshot, "fetch_picture", fetch_picture)
+    assert snapshot._fetch(httpx.URL("http://camera.example/left.jpg"), None, task) == b"a picture"
+    assert called == ["10.1.0.7"]

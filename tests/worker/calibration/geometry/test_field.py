@@ -76,6 +76,10 @@ def test_a_ridge_beside_the_middle_still_meets_the_corners_at_zero():
     corners = np.array([[x, y] for x in (-52.5, 52.5) for y in (-34, 34)])
     np.testing.assert_allclose(pitch.height(corners), 0, atol=1e-12)
     assert pitch.height(np.array([0.0, 5.0])) == pytest.approx(0.3)
+    halfway_to_the_touchlines = np.array([[0.0, (5.0 + 34.0) / 2], [0.0, (5.0 - 34.0) / 2]])
+    np.testing.assert_allclose(pitch.height(halfway_to_the_touchlines), 0.15)
+    halfway_to_the_goal_lines = np.array([[(20.0 + 52.5) / 2, 5.0], [(-10.0 - 52.5) / 2, 5.0]])
+    np.testing.assert_allclose(pitch.height(halfway_to_the_goal_lines), 0.15)
 
 
 def test_line_points_follow_the_surface():

@@ -1,12 +1,14 @@
 """A memory keeps what the first nights measured, whatever the later ones say, and counts nothing twice."""
 
 import json
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 
 import numpy as np
 import pytest
 
 from tests.worker.calibration.memory.nights import LINES, PITCH, box_camera, job, measured, painted
+from worker.calibration.detection.line_measurement import NOISE_PX, SHARED_NOISE
 from worker.calibration.geometry.derivatives import moved
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.parameters import with_focal_length
@@ -154,3 +156,10 @@ def test_measurements_of_a_memory_are_where_it_measured_them(count):
         offset = told.offset(epoch.camera, LINES.position[told.index])
         assert np.allclose(offset, epoch.offset[np.isin(epoch.index, told.index)])
         assert (told.jobs == epoch.count[np.isin(epoch.index, told.index)]).all()
+
+
+def test_of_the_noise_of_many_nights_that_part_stays_which_all_of_them_share():
+    measured = remembered(1).anchor.measurements(LINES)
+    alone, mean = (replace(measured, jobs=jobs).noise_px ** 2 for jobs in (1.0, 100.0))
+    shared = SHARED_NOISE * NOISE_PX**2
+    np.testing.assert_allclose(mean - shared, (alone - shared) / 100)

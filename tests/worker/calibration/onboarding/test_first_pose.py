@@ -398,3 +398,15 @@ def test_landmarks_lie_on_the_markings():
             min(np.linalg.norm(lines - point[:2], axis=1).min(), np.linalg.norm(on - point[:2], axis=1).min()) < 0.1
         ), name
         assert point[2] == pytest.approx(float(PITCH.height(point[:2])))
+
+
+@pytest.mark.parametrize(("farther_px", "rejected"), [(0.0, True), (20.0, False)])
+def test_a_pose_is_taken_only_where_no_other_one_explains_the_points_as_well(monkeypatch, farther_px, rejected):
+    best = fit(clicks(SOME), CAMERA)
+    elsewhere = CAMERA.with_pose(Pose.looking_at([30.0, -60.0, 20.0], [0.0, 0.0, 0.0]))
+    rival = replace(best, camera=elsewhere, off=best.off + farther_px)
+    monkeypatch.setattr("worker.calibration.onboarding.first_pose._candidates", lambda *_: [best, rival])
+    why = first_pose(best.clicks, LENS, NAMED).rejected_because
+    assert (
+        why is not None and why.startswith("a camera at (30.0, -60.0, 20.0) m explains the points as well")
+    ) == rejected

@@ -136,3 +136,19 @@ def test_a_pose_that_was_found_through_a_lens_is_no_witness_of_that_lens(too_lon
     assert np.linalg.norm(said.refined.camera.pose.position - real.pose.position) < 0.2 * away_m
     # Where pixels are on the ground is known far better than where the camera stands.
     assert np.quantile(said.ground_sigma.metres, 0.95) < 0.5 * said.sigma.position_m
+
+
+def test_nights_through_another_lens_say_of_tonights_what_they_said_of_theirs():
+    """The lens of the venue has become longer by 0.5 %, that of the camera has not."""
+    pitch = Field(105.0, 68.0, 0.12, template=load("football"))
+    real = camera("left", (0.0, -45.0, 14.0), (0.0, 0.0), focal=1000.0, size=(1280, 720))
+    given = with_focal_length(real, 5.0)
+    lines, unknowns = pitch.line_points(), Unknowns(1, [], Ground.under(pitch.line_points()))
+    found = replace(measured(lines, real), misfit_px=0.2)
+    memory = CameraMemory.from_first_job(real, AcceptedJob(real, found, lines, None, frames="first"))
+    here = replace(Estimate.initial(pitch, [given], unknowns), uneven_m=EVEN_M)
+    for _ in range(12):
+        here = gauss_newton_step(here, [given], [found], unknowns, huber_weights).to
+    (said,) = estimate_uncertainty(here, [given], [memory], [found], [NO_EVIDENCE], unknowns).each
+    assert said.refined.camera.intrinsics.focal_length_px == pytest.approx(1000.0, abs=1.0)
+    assert np.linalg.norm(said.refined.camera.pose.position - real.pose.position) < 0.05
