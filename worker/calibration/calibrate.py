@@ -29,7 +29,7 @@ from worker.calibration.records import (
 )
 from worker.calibration.refinement.diagnosis import find_suspicions
 from worker.calibration.solve import solve
-from worker.calibration.steps import is_doubtful, loss_of
+from worker.calibration.steps import loss_of
 from worker.calibration.stitching.photometric_alignment import evened_out
 
 NO_MEMORIES: Mapping[str, CameraMemory] = MappingProxyType({})
@@ -95,8 +95,7 @@ def _of_other_frames(memory: CameraMemory | None, frames: Sequence[Frame]) -> Ca
 def _recover(solution: Solution, observer: FrameObserver, progress: ProgressReporter) -> Solution:
     """Return the solution with those cameras in it that were knocked and found again; most nights there are none."""
     judged, options = solution.judged, solution.problem.options
-    is_clear = judged.accepted and not any(map(is_doubtful, judged.cameras))
-    if is_clear and options.search != "anywhere":
+    if judged.accepted and options.search != "anywhere":
         return solution
     # Only such nights pay for loading it.
     from worker.calibration.recovery import recover_knocked

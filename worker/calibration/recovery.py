@@ -35,7 +35,6 @@ from worker.calibration.relocalisation.paint import Paint
 from worker.calibration.relocalisation.relocalise import Relocalisation, mean_shift_px, relocalise, twin
 from worker.calibration.relocalisation.sought import ANYWHERE, KNOCKED_ROLL_DEG, Place, SoughtCamera, SoughtLens
 from worker.calibration.solve import solve_in_all_colours
-from worker.calibration.steps import is_doubtful
 
 LOST = frozenset({"lines", "few-lines"})
 """Reasons for a refusal of a camera that may have been knocked..."""
@@ -142,7 +141,7 @@ def _sought(problem: Problem, results: Sequence[CameraResult], doubted: Sequence
 def _is_lost(result: CameraResult) -> bool:
     """True if a camera may have been knocked."""
     if result.refusal is None:
-        return is_doubtful(result)
+        return False
     if result.refusal.reason in LOST_IF_FAR:
         # A mount that gave way over many nights stands where it was found last night.
         return result.moved.exceeds_limits

@@ -41,8 +41,6 @@ that, and how often it may."""
 HARDLY_MOVED_PX = 12.0
 """Largest mean motion of the visible lines, in pixels of a 4K frame, of a camera that stands almost where it is stored:
 within what the refinement catches."""
-DOUBTFUL = 0.75
-"""Agreement below which an accepted camera that moved may have been knocked, and caught by wrong lines."""
 SEARCHED_POWER = 3
 """Power of the network's responses in the search: what it half believes (a shadow's edge, a board) hardly pulls."""
 
@@ -240,14 +238,6 @@ def refine_without(
         together=together,
         deviations=refined.deviations + of_others,
     )
-
-
-def is_doubtful(result: CameraResult) -> bool:
-    """True if so few lines of an accepted camera are found that it may stand elsewhere.
-
-    One that stands almost where it is stored was not knocked: its lines are faint every night.
-    """
-    return result.evidence.agreement < DOUBTFUL and not has_hardly_moved(result)
 
 
 def has_hardly_moved(result: CameraResult) -> bool:
