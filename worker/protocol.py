@@ -10,7 +10,7 @@ JSON, see `worker.jobs.program`.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import IO, Any
+from typing import IO, Any, assert_never
 
 from pydantic import BaseModel
 
@@ -70,8 +70,10 @@ class Message(BaseModel):
                 return self.result.verdict
             case IntrinsicsResult():
                 return "found"
-            case _:
+            case LocateResult() | FindResult() | FieldResult():
                 return "accepted" if self.result.accepted else "rejected"
+            case _ as unknown:
+                assert_never(unknown)
 
     @property
     def outcome(self) -> dict[str, Any]:

@@ -62,6 +62,17 @@ def test_a_camera_that_is_shifted_moves_it_by_as_much():
     assert np.hypot(*found.shift) == pytest.approx(0.05, rel=1e-6)
 
 
+def test_the_shift_is_positive_to_the_right_and_away_from_the_camera():
+    # By hand, and not by `sight_axes`: a camera that stands further ahead has all of its ground further ahead.
+    place, foot = farthest_place(PITCH, ANCHOR)[:2], ANCHOR.pose.position[:2]
+    ahead = (place - foot) / np.linalg.norm(place - foot)
+    right = np.array([ahead[1], -ahead[0]])
+    assert ANCHOR.project(np.array([[*(place + right), 0.0]]))[0, 0] > ANCHOR.project(np.array([[*place, 0.0]]))[0, 0]
+    for step, expected in ((ahead, [0.0, 0.04]), (right, [0.04, 0.0])):
+        found = measure_displacement(PITCH, ANCHOR, answered([0, 0, 0, *(0.04 * step), 0.0]))
+        assert found.shift == pytest.approx(expected, abs=1e-6)
+
+
 def test_sigma_is_that_of_the_pose_at_that_place():
     rng = np.random.default_rng(3)
     root = rng.normal(size=(6, 6)) * np.repeat([2e-5, 3e-3], 3)[:, None]
