@@ -29,7 +29,7 @@ COMMANDS = {
     "intrinsics": ("onboarding:intrinsics", "Find the lens of a camera from photos of a chessboard."),
     "pose": ("onboarding:pose", "Find first poses of cameras from clicked points."),
     "find": ("find:find", "Find cameras from their frames and the field alone."),
-    "check": ("check:check", "Check a calibration of any tool by frames of its cameras."),
+    "check": ("check:check", "Check a calibration of any tool by frames."),
     "convert": ("convert:convert", "Convert a calibration to the format of another tool."),
     "stitch": ("stitch:stitch", "Stitch clips into one, on this machine."),
     "live": ("live:live", "Send the poses of a venue to renderers until stopped, by OpenTrackIO and FreeD over UDP."),

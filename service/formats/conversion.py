@@ -10,9 +10,11 @@ import math
 import zipfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 
 from service.formats.reading import ZIP_START, read_files
 from service.formats.records import CameraRecord
+from service.formats.rotations import matrix_of
 from service.formats.table import FILE_FORMATS, ExportedFile
 from service.schemas.geometry import COEFFICIENTS, Intrinsics
 from service.schemas.names import FormatName
@@ -100,7 +102,8 @@ def _losses(camera: CameraRecord, kept: CameraRecord) -> Iterator[str]:
     if camera.pose is not None and kept.pose is None:
         yield "the pose"
     elif camera.pose is not None and kept.pose is not None:
-        numbers = ([*pose.rotation, *pose.position] for pose in (camera.pose, kept.pose))
+        # Vectors of half a turn are the same turn with either sign.
+        numbers = ([*chain(*matrix_of(pose.rotation)), *pose.position] for pose in (camera.pose, kept.pose))
         if not _same(*numbers):
             yield "the place in the world; the way from camera to camera is kept"
     given, left = _coefficients(camera.intrinsics), _coefficients(kept.intrinsics)

@@ -224,8 +224,10 @@ def _pan_tilt_roll_deg(shot: NumberedCamera) -> tuple[float, float, float]:
 
 def pan_tilt_roll(b: list[list[float]]) -> tuple[float, float, float]:
     """Return the intrinsic z-x-y angles, in radians, of a matrix (3, 3), camera (x right, y ahead, z up) to world."""
-    tilt = math.asin(max(-1.0, min(1.0, b[2][1])))
-    if math.hypot(b[0][1], b[1][1]) < 1e-9:
+    level = math.hypot(b[0][1], b[1][1])
+    # An arc sine loses half of the digits near the vertical.
+    tilt = math.atan2(b[2][1], level)
+    if level < 1e-9:
         # Straight up or down: pan and roll turn about the same axis; the pan takes it all.
         return math.atan2(b[1][0], b[0][0]), tilt, 0.0
     return math.atan2(-b[0][1], b[1][1]), tilt, math.atan2(-b[2][0], b[2][2])

@@ -85,7 +85,7 @@ def test_a_job_that_a_worker_broke_off_before_it_began_is_put_back(start, worker
 def test_one_job_whose_rows_are_broken_does_not_keep_another_from_its_end(start, worker_beside, given_up):
     service = start("serve")
     first, second, of_broken_venue = (service.submitted(service.venue(name)) for name in ("first", "second", "third"))
-    changed(service, first, options={})
+    changed(service, first, options={"dry_run": "perhaps"})
     with service.database() as connection:
         broken = sa.update(tables.venues).where(tables.venues.c.id == "third")
         connection.execute(broken.values(document={"no": "venue"}))

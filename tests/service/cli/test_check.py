@@ -3,6 +3,7 @@
 import json
 import math
 from dataclasses import replace
+from unittest.mock import patch
 
 import cv2
 import numpy as np
@@ -13,6 +14,7 @@ from service.cli.check import check
 from service.formats.conversion import members_of, write_cameras
 from service.formats.reading import read_paths
 from service.formats.records import CameraRecord
+from service.observability import logs
 from service.schemas.geometry import Intrinsics, Pose
 from testbed import rendered_pair
 from testbed.spoiling import darkened
@@ -51,7 +53,8 @@ def run(tmp_path, frames, cameras, form, capsys, **options):
         (folder / name).write_bytes(content)
     ids = [one.id for one in read_paths([folder]).cameras]
     named = [f"{id}={frames}/{one.id}.jpg" for id, one in zip(ids, cameras, strict=True)]
-    with pytest.raises(typer.Exit) as ended:
+    # The logs of this process are those of the tests.
+    with patch.object(logs, "configure"), pytest.raises(typer.Exit) as ended:
         check([str(folder), *named], site=frames / "site.json", as_json=True, **options)
     printed = capsys.readouterr()
     return ended.value.exit_code, json.loads(printed.out), printed.err

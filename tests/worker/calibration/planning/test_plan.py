@@ -66,8 +66,9 @@ def test_a_mirrored_venue_has_the_mirrored_map(x, height, aim):
     one, other = aimed("one", (x, -48.0, height), (aim, 0.0)), aimed("other", (x + 4, -46.0, height), (aim + 8, 3.0))
     here = plan(PITCH, [one, other], FRESH)
     there = plan(PITCH, [mirrored(one), mirrored(other)], FRESH)
-    np.testing.assert_allclose(there.place_m, here.place_m[:, ::-1], rtol=1e-3)
-    assert there.pairs[0].stitch_m == pytest.approx(here.pairs[0].stitch_m, rel=1e-3)
+    # Points on the lines are not mirrored themselves: a line begins with one and ends beside one.
+    np.testing.assert_allclose(there.place_m, here.place_m[:, ::-1], rtol=0.01)
+    assert there.pairs[0].stitch_m == pytest.approx(here.pairs[0].stitch_m, rel=0.01)
 
 
 def test_a_calibration_errs_by_what_was_expected():
