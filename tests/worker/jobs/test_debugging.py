@@ -9,6 +9,7 @@ from service.schemas.venue import VenueIn
 from service.settings import MODEL_BESIDE_THE_CODE
 from testbed.by_models import solve
 from tests.architecture import ROOT
+from worker.calibration.records import NOT_RECORDED
 from worker.compute_resources import ComputeResources
 from worker.jobs.debugging import DebugRecorder
 
@@ -33,7 +34,7 @@ def smaller_demo():
     return VenueIn.model_validate(venue).to_venue(), files
 
 
-def solved(recorder=None):
+def solved(recorder=NOT_RECORDED):
     venue, files = smaller_demo()
     resources, options = ComputeResources(model=MODEL_BESIDE_THE_CODE, threads=1), Options(seed=1, search="wide")
     return solve(venue, files, options, resources, lambda _: None, recorder=recorder).result
