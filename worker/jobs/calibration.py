@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class NightHistory:
-    """What is known of the nights before a job, by camera, and when its frames were taken.
+    """History of the nights before a job, by camera, and the time at which its frames were taken.
 
     `last_views`: what the frames of the last accepted calibration were like; `memories`: as the engine wrote them;
     `anchors`: the poses that movement is counted from.

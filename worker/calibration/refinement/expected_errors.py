@@ -72,7 +72,7 @@ class ExpectedErrors:
 
 
 class ErrorModel:
-    """All that may be wrong with cameras at their poses, their lenses and their field."""
+    """Errors that cameras at their poses, their lenses and their field may have."""
 
     def __init__(self, pitch: Field, cameras: Sequence[Camera]) -> None:
         solved = Unknowns(len(cameras), (), Ground.under(pitch.line_points()))
