@@ -12,12 +12,12 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from worker.calibration.calibrate import calibrate
 from worker.calibration.checking.ranking import films_the_field, rank_readings
 from worker.calibration.checking.readings import Reading
 from worker.calibration.detection.segmentation import whole_frame
-from worker.calibration.diagnostics.registration import Response
 from worker.calibration.find_cameras import find_cameras
 from worker.calibration.gate.quality import CameraResult
 from worker.calibration.geometry.camera import Camera, Frame
@@ -25,6 +25,7 @@ from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.lens import Lens
 from worker.calibration.geometry.plausible_pose import films_a_field
 from worker.calibration.records import CalibrationError, Options, Progress, ProgressReporter, Recover, Segment
+from worker.calibration.recovery import LEAST_PAINT, ON_ITS_MOUNT_M, UNEXPLAINED_BY_WEATHER
 from worker.calibration.relocalisation.line_view import LineView
 from worker.calibration.relocalisation.paint import Paint
 from worker.calibration.relocalisation.sought import (
@@ -44,12 +45,9 @@ READINGS_AT, SEARCH_AT = 0.1, 0.4
 """Shares of the whole at which readings and searches begin, if they do: by the core-seconds of a zoomed pair."""
 ZOOM_UNCERTAIN = 0.25
 """Relative sigma of a focal length that somebody may have zoomed."""
-ON_ITS_MOUNT_M = 2.5
 OF_THE_FRAME = frozenset({"dark", "fogged", "blinded", "snow", "out-of-focus"})
 """Causes for which a frame shows nothing by any pose. That of a blocked view may be the ground that a wrong pose takes
 for the field."""
-LEAST_PAINT, MOST_EXPLAINED = 200, 0.15
-"""Lines are clearly seen, and a calibration clearly explains none of them: as `recovery` has it."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +74,7 @@ class CheckedCamera:
     @property
     def is_clearly_wrong(self) -> bool:
         """True if lines are clearly seen, and none of them where the file puts them."""
-        return self.explained is not None and self.explained <= MOST_EXPLAINED
+        return self.explained is not None and self.explained <= 1 - UNEXPLAINED_BY_WEATHER
 
 
 @dataclass(frozen=True)
@@ -127,7 +125,7 @@ class _Checker:
     settled: dict[str, CheckedCamera] = field(default_factory=dict)
     refusals: dict[str, str] = field(default_factory=dict)
     unusable: set[str] = field(default_factory=set)
-    _responses: dict[str, Response] = field(default_factory=dict)
+    _responses: dict[str, NDArray[np.uint8]] = field(default_factory=dict)
 
     @property
     def open(self) -> list[GivenCamera]:
@@ -178,7 +176,7 @@ class _Checker:
         given = self.given[id]
         explained = None
         if id not in self.unusable:
-            paint = Paint.of(np.rint(self._response(given) * 255).astype(np.uint8))
+            paint = Paint.of(self._response(given))
             if len(paint.middles) >= LEAST_PAINT:
                 explained = paint.explained_by(self.pitch, given.camera) if given.has_pose else None
         return CheckedCamera(
@@ -207,15 +205,13 @@ class _Checker:
                     yield reading, resized
 
     def _view(self, given: GivenCamera, resized: bool) -> LineView:
-        response = np.rint(self._response(given) * 255).astype(np.uint8)
-        return LineView.of(response, self._lens(given, resized), KNOCKED_ROLL_DEG)
+        return LineView.of(self._response(given), self._lens(given, resized), KNOCKED_ROLL_DEG)
 
-    def _response(self, given: GivenCamera) -> Response:
-        """Return the network's response (H, W), 0..1, to the first frame of a camera."""
+    def _response(self, given: GivenCamera) -> NDArray[np.uint8]:
+        """Return the network's response (H, W) to the first frame of a camera."""
         id = given.camera.id
         if id not in self._responses:
-            seen = self.segment(self.frames[id][0], whole_frame(given.camera.intrinsics.size))
-            self._responses[id] = (seen / np.float32(255)).astype(np.float32)
+            self._responses[id] = self.segment(self.frames[id][0], whole_frame(given.camera.intrinsics.size))
         return self._responses[id]
 
     def _calibrated(self, cameras: Sequence[Camera], recover: Recover) -> Sequence[CameraResult]:

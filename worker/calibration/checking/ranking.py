@@ -17,6 +17,7 @@ from worker.calibration.geometry.camera import Camera, Pose, inside
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.plausible_pose import films_a_field
 from worker.calibration.observe import FEWEST_VISIBLE_POINTS
+from worker.calibration.recovery import LEAST_PROPOSED
 from worker.calibration.relocalisation.agreement import agreement
 from worker.calibration.relocalisation.climbing import climb
 from worker.calibration.relocalisation.field_map import FieldMap
@@ -29,8 +30,6 @@ CLIMBED = 12
 """Readings that are climbed from."""
 COST_OF_A_CAUSE = 0.02
 """Agreement that each cause of a reading costs: of two that fit alike the simpler one is meant."""
-LEAST_AGREEMENT = 0.34
-"""Readings that agree less with the lines after climbing are none, as `recovery.LEAST_PROPOSED`."""
 
 
 def rank_readings(pitch: Field, cameras: Sequence[Camera], views: Sequence[LineView], seed: int) -> list[Reading]:
@@ -60,7 +59,7 @@ def rank_readings(pitch: Field, cameras: Sequence[Camera], views: Sequence[LineV
     scores = {n: climbed(n) - cost[n] for n in {*tried, 0} if coarse[n] > 0}
     at_its_word = scores.get(0, 0.0)
     best = sorted(scores, key=lambda n: -scores[n])
-    return [every[n] for n in best if scores[n] + cost[n] >= LEAST_AGREEMENT and scores[n] >= at_its_word]
+    return [every[n] for n in best if scores[n] + cost[n] >= LEAST_PROPOSED and scores[n] >= at_its_word]
 
 
 def films_the_field(pitch: Field, camera: Camera) -> bool:
