@@ -15,7 +15,6 @@ the engine or of the renderer the file has to be removed.
 from __future__ import annotations
 
 import argparse
-import time
 import zlib
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -34,13 +33,11 @@ from benchmarks.rows import Rows
 from benchmarks.scenes import FOLDER as RUNS
 from fields.template import NAMES
 from models import MODEL_PATH
-from worker.calibration.calibrate import calibrate
 from worker.calibration.gate.confidence import confidence_of, logit
 from worker.calibration.gate.quality import GATE, CameraResult
 from worker.calibration.geometry.camera import Camera, Frame, inside
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.visibility import VisibleLines
-from worker.calibration.records import CalibrationError, Options
 from worker.calibration.refinement.least_squares import CLUSTER_POINTS
 
 RIGHT_SHARE_OF_WIDTH = 0.004
@@ -180,17 +177,15 @@ def _spoil(
 
 
 def _answer(pitch: Field, stored: Camera, frame: Frame, seed: int, true: Camera | None, engine: Engine) -> dict:
-    begun = time.process_time()
     # What is lost stays lost: where a search would find it is another answer.
-    options = Options(seed=seed, recover="never")
-    try:
-        (result,) = calibrate(pitch, [stored], {stored.id: [frame]}, engine.segment, options).cameras
-    except CalibrationError as error:
-        return {"accepted": False, "why": error.kind, "core_s": time.process_time() - begun}
+    answer = engine(pitch, [stored], {stored.id: [frame]}, seed, recover="never")
+    if answer.said is None:
+        return {"accepted": False, "why": answer.why, "core_s": answer.core_seconds}
+    (result,) = answer.said.cameras
     return {
         "accepted": result.accepted,
         "reason": None if result.refusal is None else result.refusal.reason,
-        "core_s": time.process_time() - begun,
+        "core_s": answer.core_seconds,
         "shift": None if true is None else shift_in_widths(pitch, result.camera, true),
         **_inputs(pitch, result),
     }

@@ -15,7 +15,7 @@ from worker.calibration.detection.view_condition import UsualView
 from worker.calibration.gate.quality import CameraResult
 from worker.calibration.geometry.camera import Camera, Frame
 from worker.calibration.geometry.field import Field
-from worker.calibration.records import Calibration, CalibrationError, Options
+from worker.calibration.records import Calibration, CalibrationError, Options, Recover
 
 THREADS = 2
 
@@ -61,11 +61,12 @@ class Engine:
         frames: Mapping[str, Sequence[Frame]],
         seed: int,
         usual: Mapping[str, UsualView] = NOTHING_USUAL,
+        recover: Recover = "propose",
     ) -> Answer:
         """A calibration of cameras at their stored poses, with all that it costs."""
         wall, cpu = time.perf_counter(), time.process_time()
         try:
-            said = calibrate(pitch, cameras, frames, self.segment, Options(seed=seed), usual=usual)
+            said = calibrate(pitch, cameras, frames, self.segment, Options(seed=seed, recover=recover), usual=usual)
             why = said.rejected_because or ""
         except CalibrationError as error:
             said, why = None, error.detail
