@@ -24,6 +24,7 @@ import psycopg
 import pytest
 from obstore.store import from_url
 
+from service import queue
 from service.store.database import connect, migrate
 from testbed.parameters import try_first
 
@@ -195,9 +196,11 @@ Home = Embedded | Servers
 
 
 def _make_tables(url: str) -> None:
+    """Make the tables of the service and those of its queue, which would take as long again."""
     engine = connect(url)
     migrate(engine)
     engine.dispose()
+    queue.migrate(url)
 
 
 @functools.cache

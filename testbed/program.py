@@ -12,6 +12,9 @@ import time
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
+# Started without `site`, which would take as long as the program itself.
+sys.path.append(str(Path(__file__).parents[1]))
+
 from service import child_process
 from service.schemas.rotation import rotate
 

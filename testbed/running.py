@@ -23,7 +23,7 @@ from testbed import warm
 from testbed.homes import files
 from testbed.ports import free_port
 
-PROGRAM = [sys.executable, str(Path(__file__).parent / "program.py")]
+PROGRAM = [sys.executable, "-S", str(Path(__file__).parent / "program.py")]
 DEADLINE_S = 90
 SHORTEST_PAUSE_S, LONGEST_PAUSE_S = 0.01, 0.2
 SIZE = (64, 48)

@@ -7,6 +7,7 @@ with another interpreter or other paths of modules, every start is cold.
 """
 
 import array
+import asyncio
 import atexit
 import ctypes
 import functools
@@ -23,15 +24,29 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
+from testbed.compiled_statements import share_compiled_statements
+
 PR_SET_CHILD_SUBREAPER = 36
 # All that a service, a worker or a command loads sooner or later.
 IMPORTED = (
+    "fastapi",
+    "service.app",
     "service.cli.main",
     "service.cli.serve",
     "service.cli.worker",
     "service.cli.venues",
     "psycopg",
     "alembic.command",
+    # By the first request or job.
+    "anyio._backends._asyncio",
+    "certifi",
+    "dbos._sys_db_sqlite",
+    "service.formats.stmap",
+    "service.intake.pose_warnings",
+    "service.schemas.lens_map",
+    "service.store.movement",
+    "uvicorn.lifespan.on",
+    "uvicorn.loops.auto",
 )
 # What the interpreter reads as it starts.
 OF_THE_INTERPRETER = "PYTHON"
@@ -197,10 +212,25 @@ def serve(requests: socket.socket, asking: int) -> None:
         return become(*json.loads(request))
 
 
+async def prepare_routes() -> None:
+    """Have the routes ready that each service would make ready at its first request, by a request that none takes."""
+    answer = []
+
+    async def send(message) -> None:
+        answer.append(message)
+
+    nowhere = {"type": "http", "method": "GET", "path": "/nowhere", "headers": [], "query_string": b""}
+    routes = sys.modules["service.app"].routes_of_all()
+    await sys.modules["fastapi"].APIRouter(routes=[*routes])(nowhere, None, send)
+    assert answer[0]["status"] == 404
+
+
 def main() -> None:
     number, asking = map(int, sys.argv[1:])
     for module in IMPORTED:
         importlib.import_module(module)
+    share_compiled_statements()
+    asyncio.run(prepare_routes())
     assert len([*Path("/proc/self/task").iterdir()]) == 1, "a thread would be missing in what is forked"
     gc.collect()
     gc.freeze()

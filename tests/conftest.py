@@ -1,9 +1,12 @@
 """What a machine may lack, and the homes that tests run in."""
 
+import gc
 import importlib.util
 import itertools
 import os
 import re
+import shutil
+import tempfile
 from pathlib import Path
 
 # One thread of BLAS, as the worker sets it, before NumPy is loaded, and one of the network: several only wait for each
@@ -16,6 +19,7 @@ import pytest
 import structlog
 
 from service.store.database import connect
+from testbed.compiled_statements import share_compiled_statements
 from testbed.homes import Embedded, Servers, postgres_binaries, postgres_server, s3_server
 from testbed.stock import Stock
 
@@ -23,13 +27,17 @@ from testbed.stock import Stock
 hypothesis.settings.register_profile("esc", deadline=None)
 hypothesis.settings.load_profile("esc")
 
+share_compiled_statements()
 # As the service logs: no test waits for pictures of tracebacks.
 structlog.configure(
     [structlog.dev.ConsoleRenderer(colors=False, exception_formatter=structlog.dev.plain_traceback)],
 )
 
+# Nothing of a test must survive a power cut: where memory has room for all files of a run, no write waits for a disk.
+MEMORY, ROOM_GB = Path("/dev/shm"), 6
+
 # Tests of the whole service, and of its pages in a browser.
-WHOLE_SERVICE = [Path(__file__).parent / folder for folder in ("e2e", "pages", "released")]
+WHOLE_SERVICE = ("tests/e2e/", "tests/pages/", "tests/released/")
 # Fixtures that start a server, which `make test-fast` does without.
 SERVERS = {"postgres", "bucket", "servers"}
 # What tests can do without, and how to enable those that cannot.
@@ -59,6 +67,19 @@ def pytest_configure(config):
     if unknown:
         known = ", ".join(PARTS)
         raise pytest.UsageError(f"ESC_TEST_REQUIRE names {', '.join(sorted(unknown))}; known are {known}")
+    if MEMORY.is_dir() and shutil.disk_usage(MEMORY).free > ROOM_GB << 30:
+        os.environ["TMPDIR"] = tempfile.tempdir = str(MEMORY)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection():
+    """Look for no garbage in what is collected: it stays to the end, and to look through it takes half a second."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        gc.enable()
 
 
 @pytest.hookimpl(wrapper=True)
@@ -79,24 +100,32 @@ def needs_servers(item):
 
 
 def dealt(items, processes):
-    """The tests in such an order that no core is idle before all of them are.
+    """The tests in such an order that no core is idle before all of them are, and few processes start the same servers.
 
     xdist gives each process a part of the list, all of a size; who is done takes from the end of what another has. The
-    first process begins with the longest tests. The others begin with those of the whole service, which wait more than
-    they compute, and beside which the longest ones compute; what only computes fills the end.
+    first process begins with what needs PostgreSQL and S3, so that it alone starts them. The others begin with the
+    longest tests and with those of the whole service, folder by folder: these wait more than they compute. What only
+    computes fills the end.
     """
-    longest, waiting, computing = [], [], []
+    on_servers, longest, waiting, computing = [], [], [], []
     for item in items:
-        of_the_whole = any(item.path.is_relative_to(folder) for folder in WHOLE_SERVICE)
-        is_one_of_the_longest = item.get_closest_marker("first") or item.get_closest_marker("long")
-        (longest if is_one_of_the_longest else waiting if of_the_whole else computing).append(item)
+        if item.get_closest_marker("servers"):
+            on_servers.append(item)
+        elif item.get_closest_marker("first") or item.get_closest_marker("long"):
+            longest.append(item)
+        elif item.nodeid.startswith(WHOLE_SERVICE):
+            waiting.append(item)
+        else:
+            computing.append(item)
+    waiting = longest + waiting
     others = max(1, processes - 1)
     ends = [len(waiting) * number // others for number in range(others + 1)]
-    begins = [waiting[begin:end] for begin, end in itertools.pairwise(ends)]
-    begins = [longest, *begins] if processes > 1 else [longest + waiting]
+    begins = [on_servers, *(waiting[begin:end] for begin, end in itertools.pairwise(ends))]
+    if processes == 1:
+        begins = [on_servers + waiting]
     order = []
     for number, begin in enumerate(begins):
-        part = (len(items) - len(order)) // (processes - number)
+        part = (len(items) - len(order)) // max(1, len(begins) - number)
         filling = max(0, part - len(begin))
         order += begin + computing[:filling]
         computing = computing[filling:]

@@ -23,8 +23,12 @@ pytestmark = pytest.mark.slow
 FRAMES_PER_SECOND = 25.0
 COUNT = 40
 LEFT = pair()[0]
-PICTURE = pair_frames()[0]
 STORED = moved(LEFT, (0.0012, -0.0008, 0.0005), (0.01, 0.005, -0.01))
+
+
+def still_picture() -> np.ndarray:
+    """What the camera shows while it stands still; painted by the first test that needs it."""
+    return pair_frames()[0]
 
 
 def turn(number: int) -> np.ndarray:
@@ -36,9 +40,13 @@ def turn(number: int) -> np.ndarray:
 @cache
 def frame(number: int) -> np.ndarray:
     """What the camera shows when it has turned: all of its picture turns alike."""
-    shaken = Sway.from_turn(-turn(number), LEFT.intrinsics).rows(PICTURE, 0, len(PICTURE))
-    noise = np.random.default_rng(number).normal(0, 2, shaken.shape)
-    return np.clip(shaken + noise, 0, 255).astype(np.uint8)
+    shaken = Sway.from_turn(-turn(number), LEFT.intrinsics).rows(still_picture(), 0, LEFT.intrinsics.size[1])
+    return with_noise(shaken, np.random.default_rng(number), 2)
+
+
+def with_noise(picture: np.ndarray, rng: np.random.Generator, sigma: float) -> np.ndarray:
+    noise = sigma * rng.standard_normal(picture.shape, np.float32)
+    return np.clip(picture + noise, 0, 255).astype(np.uint8)
 
 
 def true(number: int):
@@ -148,7 +156,7 @@ def test_who_looks_ahead_bridges_a_short_gap():
 
 
 def test_a_frame_that_shows_no_lines_is_coasted_over():
-    moments = followed({15: np.full_like(PICTURE, 90)})
+    moments = followed({15: np.full_like(still_picture(), 90)})
     assert how(moments)[14:17] == ["measured", "coasted", "measured"]
 
 
@@ -181,7 +189,7 @@ def test_a_lens_that_is_zoomed_is_refused_however_long_it_is_looked_at(by):
 
 def test_a_picture_that_is_noisier_or_less_sharp_than_usual_is_measured():
     rng = np.random.default_rng(3)
-    noisy = {n: np.clip(frame(n) + rng.normal(0, 15, PICTURE.shape), 0, 255).astype(np.uint8) for n in range(12, 20)}
+    noisy = {number: with_noise(frame(number), rng, 15) for number in range(12, 20)}
     soft = {number: cv2.GaussianBlur(frame(number), (0, 0), 1.0) for number in range(24, 32)}
     moments = followed(noisy | soft)
     assert set(how(moments)) == {"measured"}
@@ -191,8 +199,7 @@ def test_a_picture_that_is_noisier_or_less_sharp_than_usual_is_measured():
 def test_a_pose_does_not_jump_when_lines_are_hidden_that_a_wrong_lens_puts_beside_their_places():
     lens = LEFT.intrinsics
     wrong = LEFT.with_lens(replace(lens, distortion=lens.distortion + [0.01, 0, 0, 0, 0]))
-    still = [np.clip(PICTURE + np.random.default_rng(n).normal(0, 2, PICTURE.shape), 0, 255) for n in range(16)]
-    frames = [each.astype(np.uint8) for each in still]
+    frames = [with_noise(still_picture(), np.random.default_rng(number), 2) for number in range(16)]
     for hidden in frames[8:]:
         hidden[:, :400] = (60, 130, 70)
     follower = CameraTracker(CROWNED, [wrong], {"left": frames[0]}, FRAMES_PER_SECOND, look_ahead=0)
@@ -204,5 +211,5 @@ def test_a_pose_does_not_jump_when_lines_are_hidden_that_a_wrong_lens_puts_besid
 
 def test_a_first_frame_without_lines_is_said():
     with pytest.raises(CalibrationError, match="first frame of camera left does not show its lines") as refused:
-        CameraTracker(CROWNED, [STORED], {"left": np.full_like(PICTURE, 90)}, FRAMES_PER_SECOND)
+        CameraTracker(CROWNED, [STORED], {"left": np.full_like(still_picture(), 90)}, FRAMES_PER_SECOND)
     assert refused.value.kind == "lines-not-seen"
