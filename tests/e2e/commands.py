@@ -46,10 +46,11 @@ def all_commands():
         waiting += [(f"{words} {name}", one) for name, one in getattr(command, "commands", {}).items()]
 
 
-def esc_process(folder: Path, *arguments: str, **environment: str) -> CompletedProcess:
+def esc_process(folder: Path, *arguments: str, stdin: int | None = None, **environment: str) -> CompletedProcess:
     """Run the command in a process of its own, with this beside the environment of the tests."""
     command = [sys.executable, "-m", "service.cli", *arguments]
-    with warm.Popen(command, cwd=folder, env=os.environ | environment, stdout=PIPE, stderr=PIPE, text=True) as process:
+    how = {"cwd": folder, "env": os.environ | environment, "stdin": stdin, "stdout": PIPE, "stderr": PIPE}
+    with warm.Popen(command, text=True, **how) as process:
         try:
             out, err = process.communicate(timeout=60)
         except BaseException:

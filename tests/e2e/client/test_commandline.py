@@ -15,6 +15,7 @@ from typer.main import get_command
 from service import build
 from service.cli.main import app
 from service.store.database import SCHEMA_TABLE, connect, migrate, writing
+from testbed import warm
 from testbed.parameters import try_first
 from testbed.running import FRAMES, keys_in, png, venue, wait_for
 from tests.e2e.commands import all_commands, esc_here, esc_process
@@ -50,16 +51,7 @@ def test_a_venue_is_deleted_at_a_terminal_only_after_a_yes(service, tmp_path, na
     service.venue(name)
     terminal, its_end = pty.openpty()
     os.write(terminal, said.encode())
-    command = [sys.executable, "-m", "service.cli", "venue", "delete", name, *options]
-    answer = subprocess.run(
-        command,
-        cwd=tmp_path,
-        env=os.environ | {"ESC_URL": service.url},
-        stdin=its_end,
-        capture_output=True,
-        text=True,
-        timeout=60,
-    )
+    answer = esc_process(tmp_path, "venue", "delete", name, *options, stdin=its_end, ESC_URL=service.url)
     os.close(terminal)
     os.close(its_end)
     assert answer.returncode == code, answer.stderr
@@ -183,9 +175,8 @@ def at_terminal(service, folder, *arguments):
     """What a command prints on a terminal, and what it exits with."""
     terminal, its_end = pty.openpty()
     command = [sys.executable, "-m", "service.cli", *arguments]
-    with subprocess.Popen(
-        command, cwd=folder, env=os.environ | {"ESC_URL": service.url}, stdout=its_end, stderr=subprocess.PIPE
-    ) as process:
+    environment = os.environ | {"ESC_URL": service.url}
+    with warm.Popen(command, cwd=folder, env=environment, stdout=its_end, stderr=subprocess.PIPE) as process:
         os.close(its_end)
         said = b""
         # Where nobody has the other end any more, Linux answers with an error.
@@ -303,8 +294,8 @@ def test_a_venue_is_followed_line_by_line_until_it_is_deleted(service, name):
     service.venue(name)
     command = [sys.executable, "-m", "service.cli", "venue", "follow", name, "--url", service.url]
     with (
-        subprocess.Popen([*command, "--only", "poses.changed"], stdout=subprocess.PIPE, text=True) as lines,
-        subprocess.Popen([*command, "--json"], stdout=subprocess.PIPE, text=True) as whole,
+        warm.Popen([*command, "--only", "poses.changed"], stdout=subprocess.PIPE, text=True) as lines,
+        warm.Popen([*command, "--json"], stdout=subprocess.PIPE, text=True) as whole,
     ):
         told = [lines.stdout.readline()]
         assert json.loads(whole.stdout.readline())["type"] == "poses.current"
@@ -516,7 +507,7 @@ def test_a_callback_without_a_server_is_said_to_be_of_no_use(esc, tmp_path):
 def test_a_worker_alone_serves_an_api_alone(start):
     service = start("serve")
     command = [sys.executable, "-m", "service.cli", "worker", "--name", "alone"]
-    worker = subprocess.Popen(command, env=service.environment, stderr=service.log)
+    worker = warm.Popen(command, env=service.environment, stderr=service.log)
     job = service.submitted(service.venue("v"))
     assert service.end(job)["status"] == "succeeded"
     worker.send_signal(signal.SIGTERM)
