@@ -19,12 +19,13 @@ import os
 import socket
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from testbed.compiled_statements import share_compiled_statements
+from testbed.shared_caches import share_caches
 
 PR_SET_CHILD_SUBREAPER = 36
 # All that a service, a worker or a command loads sooner or later.
@@ -45,6 +46,7 @@ IMPORTED = (
     "service.intake.pose_warnings",
     "service.schemas.lens_map",
     "service.store.movement",
+    "testbed.stock",
     "uvicorn.lifespan.on",
     "uvicorn.loops.auto",
 )
@@ -225,11 +227,25 @@ async def prepare_routes() -> None:
     assert answer[0]["status"] == 404
 
 
+def compile_statements() -> None:
+    """Compile what each service and worker would compile for its first job, by a job that none computes."""
+    with tempfile.TemporaryDirectory() as folder:
+        stock = sys.modules["testbed.stock"].Stock(Path(folder))
+        submission = stock.submission("v")
+        stock.submissions.submit(submission, 1, lambda *_: None)
+        task = stock.attempts.begin(submission.job_id)
+        stock.attempts.finish(task, sys.modules["testbed.stock"].result(task.venue, accepted=True), [])
+        stock.jobs.get(submission.job_id)
+        stock.engine.dispose()
+
+
 def main() -> None:
     number, asking = map(int, sys.argv[1:])
     for module in IMPORTED:
         importlib.import_module(module)
-    share_compiled_statements()
+    share_caches()
+    sys.modules["httpx"].create_ssl_context()
+    compile_statements()
     asyncio.run(prepare_routes())
     assert len([*Path("/proc/self/task").iterdir()]) == 1, "a thread would be missing in what is forked"
     gc.collect()

@@ -19,15 +19,15 @@ import pytest
 import structlog
 
 from service.store.database import connect
-from testbed.compiled_statements import share_compiled_statements
 from testbed.homes import Embedded, Servers, postgres_binaries, postgres_server, s3_server
+from testbed.shared_caches import share_caches
 from testbed.stock import Stock
 
 # How long an example takes says how busy the machine is, not whether the property holds.
 hypothesis.settings.register_profile("esc", deadline=None)
 hypothesis.settings.load_profile("esc")
 
-share_compiled_statements()
+share_caches()
 # As the service logs: no test waits for pictures of tracebacks.
 structlog.configure(
     [structlog.dev.ConsoleRenderer(colors=False, exception_formatter=structlog.dev.plain_traceback)],
