@@ -13,6 +13,7 @@ from structlog.testing import capture_logs
 
 from service import serving
 from service.settings import Settings
+from testbed import warm
 from testbed.parameters import try_first
 from testbed.running import wait_for
 
@@ -52,7 +53,7 @@ def test_a_worker_that_cannot_be_started_is_tried_again(starts, tmp_path):
 @pytest.mark.long
 def test_an_ipv6_address_is_told_as_a_url_has_it(tmp_path):
     command = [sys.executable, "-m", "service.cli", "serve", "--host", "::1", "--port", "0", "--data", str(tmp_path)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as api:
+    with warm.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as api:
         line = api.stdout.readline()
         api.terminate()
     assert line.startswith("ESC listens on http://[::1]:")
@@ -63,9 +64,7 @@ def listening(folder, host):
     """The port of an API on a host."""
     command = [sys.executable, "-m", "service.cli", "serve", "--data", str(folder)]
     environment = os.environ | {"ESC_HOST": host, "ESC_PORT": "0", "ESC_AUTH": "off"}
-    with subprocess.Popen(
-        command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
-    ) as api:
+    with warm.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as api:
         try:
             yield int(api.stdout.readline().rpartition(":")[2])
         finally:

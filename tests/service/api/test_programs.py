@@ -35,11 +35,11 @@ def clicked():
 
 def answering(after_s):
     answer = '{"result": null, "error": null, "lines": [], "expected": []}'
-    return [sys.executable, "-c", f"import time; time.sleep({after_s}); print('{answer}')"]
+    return [sys.executable, "-S", "-c", f"import time; time.sleep({after_s}); print('{answer}')"]
 
 
 def test_who_waits_for_a_turn_holds_no_thread():
-    poses, threads, clicks = ClickedPoses(Settings(pose_program=answering(0))), [], 60
+    poses, threads, clicks = ClickedPoses(Settings(pose_program=answering(0))), [], 12
 
     async def click():
         found = [asyncio.create_task(poses.find(clicked())) for _ in range(clicks)]
