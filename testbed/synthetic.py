@@ -84,14 +84,17 @@ def paint_markings(pitch: Field, camera: Camera, colour: str | None = None) -> N
     width, height = camera.intrinsics.size
     middles = _blocks(camera)
     behind = _ground_at(pitch, camera, middles)
+    markings = [one for one in pitch.markings() if colour in (None, one.colour)]
+    x, y = np.ascontiguousarray(behind[..., 0]), np.ascontiguousarray(behind[..., 1])
+    reach = _step(x) + _step(y)
+    close = [_close(one, behind, (x, y), reach + one.width) for one in markings]
+    painted = np.any(close, axis=0) if close else np.zeros(behind.shape[:2], bool)
+    met = _met(pitch, camera, _sampled_rays(camera, middles[painted]))
     side = BLOCK * SAMPLES
     paint = np.zeros((*middles.shape[:2], side, side), np.float32)
-    for marking in pitch.markings():
-        if colour not in (None, marking.colour):
-            continue
-        close = _close(marking, behind)
-        covered = _covered(marking, _met(pitch, camera, _sampled_rays(camera, middles[close])))
-        paint[close] = np.maximum(paint[close], np.nan_to_num(covered))
+    for marking, its in zip(markings, close, strict=True):
+        covered = _covered(marking, met[its[painted]])
+        paint[its] = np.maximum(paint[its], np.nan_to_num(covered))
     sampled = paint.transpose(0, 2, 1, 3).reshape(-1, paint.shape[1] * side)
     return cv2.resize(sampled, None, fx=1 / SAMPLES, fy=1 / SAMPLES, interpolation=cv2.INTER_AREA)[:height, :width]
 
@@ -135,10 +138,27 @@ def _met(pitch: Field, camera: Camera, rays: Array) -> Array:
     return points
 
 
-def _close(marking: Marking, points: Array) -> NDArray[np.bool_]:
-    """True where a marking may reach into the blocks (h, w) with these points (h, w, 2) in their middles."""
-    across, along, half_length = _place(marking, points)
-    return (np.abs(across) < marking.width / 2 + _step(across)) & (np.abs(along) < half_length + _step(along))
+def _close(marking: Marking, points: Array, axes: tuple[Array, Array], reach: Array) -> NDArray[np.bool_]:
+    """True where a marking may reach into the blocks (h, w) with these points (h, w, 2) in their middles.
+
+    `axes`: the points, axis by axis (h, w); `reach` (h, w): no part of a block is farther from its middle, in m.
+    """
+    close = np.zeros(reach.shape, bool)
+    around = np.ones(reach.shape, bool)
+    for at, low, high in zip(axes, marking.centre.min(axis=0), marking.centre.max(axis=0), strict=True):
+        around &= np.abs(at - (low + high) / 2) < (high - low) / 2 + reach
+    if not around.any():
+        return close
+    # Slopes are measured beside it, too.
+    rows, columns = (
+        slice(max(0, int(there[0]) - 2), int(there[-1]) + 3)
+        for there in (np.flatnonzero(around.any(axis=1)), np.flatnonzero(around.any(axis=0)))
+    )
+    across, along, half_length = _place(marking, points[rows, columns])
+    close[rows, columns] = (np.abs(across) < marking.width / 2 + _step(across)) & (
+        np.abs(along) < half_length + _step(along)
+    )
+    return close
 
 
 def _covered(marking: Marking, points: Array) -> Array:

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from testbed.rendered_pair import SIZE, cameras, frames, venue
+from testbed.rendered_pair import SIZE, cameras, encoded, frames, venue
 from testbed.running import FRAMES
 from tests.e2e.commands import esc_here
 from tests.once import made_once
@@ -20,10 +20,15 @@ def site(**known):
     return place
 
 
-def write(folder, place):
+def write(folder, place, shown=None):
     (folder / "site.json").write_text(json.dumps(place))
-    for camera, frame in frames().items():
+    for camera, frame in (shown or frames()).items():
         (folder / f"{camera}.jpg").write_bytes(frame)
+
+
+def grey():
+    frame = encoded(np.full((SIZE[1], SIZE[0], 3), 128, np.uint8))
+    return {"left": frame, "right": frame}
 
 
 def find(folder, *more):
@@ -76,10 +81,7 @@ def test_each_candidate_has_a_picture(answered):
 @pytest.mark.long
 def test_a_frame_that_shows_no_field_is_refused_with_why_and_writes_no_venue(tmp_path):
     lens = ("image_size", "intrinsics")
-    write(tmp_path, site(left=lens, right=lens))
-    grey = np.full((SIZE[1], SIZE[0], 3), 128, np.uint8)
-    for camera in ("left", "right"):
-        cv2.imwrite(str(tmp_path / f"{camera}.jpg"), grey)
+    write(tmp_path, site(left=lens, right=lens), grey())
     answer = find(tmp_path)
     assert answer.returncode == 3
     assert "Camera left was not found: " in answer.stderr
@@ -107,7 +109,7 @@ def test_a_frame_that_shows_no_field_is_refused_with_why_and_writes_no_venue(tmp
 def test_what_cannot_be_asked_is_said(tmp_path, change, frames_given, said):
     place = site()
     change(place)
-    write(tmp_path, place)
+    write(tmp_path, place, grey())
     answer = esc_here(tmp_path, "find", "site.json", *frames_given, "-o", "venue.json")
     assert answer.returncode == 2
     assert said in answer.stderr

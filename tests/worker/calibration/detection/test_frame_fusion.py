@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from testbed.synthetic import BARREL, CROWNED, camera, paint_frame
+from testbed.synthetic import BARREL, PITCH, camera, paint_frame
 from worker.calibration.detection.contrast import GREEN, Channels
 from worker.calibration.detection.frame_fusion import Sway, median, sways
 from worker.calibration.geometry.camera import Pose
@@ -39,7 +39,7 @@ def frames():
         direction = one.rays(pixels) @ ON_A_MAST.pose.matrix.T
         at = (100 * direction[..., :2] / direction[..., 2:] + 200).astype(np.float32)
         beside = cv2.remap(surroundings(), at[..., 0], at[..., 1], cv2.INTER_CUBIC, borderMode=cv2.BORDER_REFLECT)
-        pictures.append(np.clip(paint_frame(CROWNED, one) + beside[..., None], 0, 255).astype(np.uint8))
+        pictures.append(np.clip(paint_frame(PITCH, one) + beside[..., None], 0, 255).astype(np.uint8))
     return tuple(pictures)
 
 
@@ -58,7 +58,7 @@ def with_walker():
 
 
 def of_mean_turn():
-    return paint_frame(CROWNED, moved(ON_A_MAST, np.concatenate([TURNS.mean(axis=0), np.zeros(3)])))
+    return paint_frame(PITCH, moved(ON_A_MAST, np.concatenate([TURNS.mean(axis=0), np.zeros(3)])))
 
 
 def far_line(picture):
