@@ -1,4 +1,6 @@
-"""Start processes of `service.cli` by fork from a parent that has imported everything: imports are most of a start.
+"""Start processes of `service.cli` and programs that an API starts by fork from a parent that has imported everything.
+
+Imports are most of a start.
 
 Each is a real process and a child of the one that asked, as `subprocess.Popen` makes them: the warm parent forks twice,
 and whoever asked is the nearest subreaper (prctl(2)) of what the first fork leaves behind. What a process reads before
@@ -22,6 +24,7 @@ import sys
 import tempfile
 import threading
 import time
+import types
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -49,6 +52,15 @@ IMPORTED = (
     "testbed.stock",
     "uvicorn.lifespan.on",
     "uvicorn.loops.auto",
+    "worker.programs.stitch.__main__",
+)
+# Programs that an API starts for single requests.
+PROGRAMS = (
+    "worker.programs.clicked_pose",
+    "worker.programs.draw",
+    "worker.programs.snapshot",
+    "worker.programs.stitch",
+    "worker.programs.stmap",
 )
 # What the interpreter reads as it starts.
 OF_THE_INTERPRETER = "PYTHON"
@@ -60,26 +72,43 @@ SPARE_WORKERS = 2
 class Popen(subprocess.Popen):
     """`subprocess.Popen`, which has commands of `service.cli` forked from the warm parent."""
 
+    modules: Sequence[str] = ("service.cli",)
+
+    @staticmethod
+    def parent() -> "WarmParent":
+        return warm_parent()
+
     def _execute_child(self, args, *how):
         cwd, environment, (stdin, _, _, stdout, _, stderr) = how[4], how[5], how[9:15]
-        arguments = arguments_of(args, environment)
-        if arguments is None:
+        asked = asked_of(args, environment)
+        if asked is None or asked[0] not in self.modules:
             return super()._execute_child(args, *how)
         files = [given if given != -1 else own for own, given in enumerate((stdin, stdout, stderr))]
-        self.pid = warm_parent().fork(arguments, str(cwd or Path.cwd()), dict(environment or os.environ), files)
+        self.pid = self.parent().fork(asked, str(cwd or Path.cwd()), dict(environment or os.environ), files)
         self._child_created = True
         return self._close_pipe_fds(*how[9:15])
 
 
-def arguments_of(command, environment) -> list[str] | None:
-    """Arguments of `service.cli` in a command; None if the warm parent cannot stand in for its interpreter."""
+class ProgramPopen(Popen):
+    """`subprocess.Popen`, which has programs of an API forked from the warm parent."""
+
+    modules = PROGRAMS
+
+
+# As the API in the process of the tests starts them.
+run = types.FunctionType(subprocess.run.__code__, {**vars(subprocess), "Popen": ProgramPopen}, "run")
+run.__kwdefaults__ = subprocess.run.__kwdefaults__
+
+
+def asked_of(command, environment) -> list[str] | None:
+    """Module and arguments of a command; None if a warm parent cannot stand in for its interpreter."""
     environment = os.environ if environment is None else environment
     if sys.platform != "linux" or isinstance(command, str):
         return None
     program, *arguments = map(str, command)
     arguments = arguments[1:] if arguments[:1] == ["-P"] else arguments
     same = of_the_interpreter(environment) == of_the_interpreter(os.environ)
-    return arguments[2:] if program == sys.executable and arguments[:2] == ["-m", "service.cli"] and same else None
+    return arguments[1:] if program == sys.executable and arguments[:1] == ["-m"] and same else None
 
 
 def of_the_interpreter(environment) -> dict[str, str]:
@@ -99,16 +128,19 @@ class WarmParent:
         ctypes.CDLL(None).prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
         self._asking = threading.Lock()
         self._socket, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        command = [sys.executable, "-m", "testbed.warm", str(theirs.fileno()), str(os.getpid())]
         with theirs:
-            self._process = subprocess.Popen(
-                command, cwd=Path(__file__).parents[1], stdin=subprocess.DEVNULL, pass_fds=[theirs.fileno()]
-            )
+            self._begin(theirs)
+
+    def _begin(self, theirs: socket.socket) -> None:
+        command = [sys.executable, "-m", "testbed.warm", str(theirs.fileno()), str(os.getpid())]
+        self._process = subprocess.Popen(
+            command, cwd=Path(__file__).parents[1], stdin=subprocess.DEVNULL, pass_fds=[theirs.fileno()]
+        )
         atexit.register(self._end)
 
-    def fork(self, arguments: list[str], folder: str, environment: dict[str, str], files: list[int]) -> int:
-        """The id of a child of this process, which runs `service.cli` with these files as its first three."""
-        request = json.dumps([arguments, folder, environment]).encode()
+    def fork(self, asked: list[str], folder: str, environment: dict[str, str], files: list[int]) -> int:
+        """The id of a child of this process, which runs a module with these files as its first three."""
+        request = json.dumps([asked, folder, environment]).encode()
         rights = (socket.SOL_SOCKET, socket.SCM_RIGHTS, array.array("i", files))
         with self._asking:
             self._socket.sendmsg([request], [rights])
@@ -119,6 +151,25 @@ class WarmParent:
     def _end(self) -> None:
         self._socket.close()
         self._process.wait()
+
+
+class ProgramParent(WarmParent):
+    """A warm parent of programs, which is forked before its parent has threads."""
+
+    def __init__(self, spare: Sequence["SpareWorker"]) -> None:
+        """`spare`: those that wait to be workers, whose pipes are none of its business."""
+        self._spare = spare
+        super().__init__()
+
+    def _begin(self, theirs: socket.socket) -> None:
+        asking = os.getpid()
+        if os.fork():
+            return
+        self._socket.close()
+        for one in self._spare:
+            os.close(one._writer)
+        serve(theirs, asking)
+        sys.exit(run_program(*sys.argv))
 
 
 class SpareWorker:
@@ -142,10 +193,10 @@ class SpareWorker:
             os.dup2(nothing.fileno(), 0)
         become(*json.loads(asked))
 
-    def begin(self, arguments: list[str], folder: str, environment: dict[str, str]) -> int | None:
+    def begin(self, asked: list[str], folder: str, environment: dict[str, str]) -> int | None:
         """Start the worker, and return its process id."""
         with os.fdopen(self._writer, "wb") as pipe:
-            pipe.write(json.dumps([arguments, folder, environment]).encode())
+            pipe.write(json.dumps([asked, folder, environment]).encode())
         return self.pid
 
 
@@ -159,27 +210,35 @@ def spare_workers() -> list[SpareWorker]:
     return spare
 
 
-def kept_by(waiting: list[SpareWorker]) -> type[subprocess.Popen]:
-    """Return the `Popen` by which `esc up` starts its worker: the spare ones first, later ones as always."""
+def started_by(waiting: list[SpareWorker], programs: ProgramParent) -> type[subprocess.Popen]:
+    """Return the `Popen` of a service: its workers are the spare ones first, and its programs are forked."""
 
-    class Kept(subprocess.Popen):
+    class Started(ProgramPopen):
+        @staticmethod
+        def parent() -> WarmParent:
+            return programs
+
         def _execute_child(self, args, *how):
-            arguments = arguments_of(args, how[5])
-            if not waiting or not arguments or arguments[0] != "worker":
+            asked = asked_of(args, how[5])
+            if not waiting or not asked or asked[:2] != ["service.cli", "worker"]:
                 return super()._execute_child(args, *how)
-            self.pid = waiting.pop(0).begin(arguments, str(how[4] or Path.cwd()), dict(how[5]))
+            self.pid = waiting.pop(0).begin(asked, str(how[4] or Path.cwd()), dict(how[5]))
             self._child_created = True
             return self._close_pipe_fds(*how[9:15])
 
-    return Kept
+    return Started
 
 
-def become(arguments: list[str], folder: str, environment: dict[str, str]) -> None:
-    """Take on arguments, folder and environment of another process."""
+def become(asked: list[str], folder: str, environment: dict[str, str]) -> None:
+    """Take on module, arguments, folder and environment of another process."""
     os.environ.clear()
     os.environ.update(environment)
     time.tzset()
     os.chdir(folder)
+    module, *arguments = asked
+    if module != "service.cli":
+        sys.argv[:] = asked
+        return
     # As `python -m service.cli` has them.
     program = importlib.util.find_spec("service.cli.__main__")
     sys.modules["__main__"].__package__ = program.parent
@@ -227,6 +286,11 @@ async def prepare_routes() -> None:
     assert answer[0]["status"] == 404
 
 
+def run_program(module: str, *arguments: str) -> int | None:
+    """Run one of `PROGRAMS` as `python -m` does."""
+    return sys.modules.get(f"{module}.__main__", sys.modules[module]).main(*arguments)
+
+
 def compile_statements() -> None:
     """Compile what each service and worker would compile for its first job, by a job that none computes."""
     with tempfile.TemporaryDirectory() as folder:
@@ -241,7 +305,7 @@ def compile_statements() -> None:
 
 def main() -> None:
     number, asking = map(int, sys.argv[1:])
-    for module in IMPORTED:
+    for module in (*IMPORTED, *PROGRAMS):
         importlib.import_module(module)
     share_caches()
     sys.modules["httpx"].create_ssl_context()
@@ -251,10 +315,13 @@ def main() -> None:
     gc.collect()
     gc.freeze()
     serve(socket.socket(fileno=number), asking)
-    if sys.argv[1:2] == ["up"]:
-        waiting = spare_workers()
-        if waiting:
-            subprocess.Popen = kept_by(waiting)
+    if sys.argv[0] in PROGRAMS:
+        sys.exit(run_program(*sys.argv))
+    if sys.argv[1:2] in (["up"], ["serve"]):
+        waiting = spare_workers() if sys.argv[1] == "up" else []
+        # A spare worker has gone on from there, and is none of both.
+        if sys.argv[1:2] in (["up"], ["serve"]):
+            subprocess.Popen = started_by(waiting, ProgramParent(waiting))
     sys.modules["service.cli.main"].main()
 
 

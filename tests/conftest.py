@@ -6,6 +6,7 @@ import itertools
 import os
 import re
 import shutil
+import subprocess
 import tempfile
 from pathlib import Path
 
@@ -19,6 +20,7 @@ import pytest
 import structlog
 
 from service.store.database import connect
+from testbed import warm
 from testbed.homes import Embedded, Servers, postgres_binaries, postgres_server, s3_server
 from testbed.shared_caches import share_caches
 from testbed.stock import Stock
@@ -28,6 +30,7 @@ hypothesis.settings.register_profile("esc", deadline=None)
 hypothesis.settings.load_profile("esc")
 
 share_caches()
+subprocess.run = warm.run
 # As the service logs: no test waits for pictures of tracebacks.
 structlog.configure(
     [structlog.dev.ConsoleRenderer(colors=False, exception_formatter=structlog.dev.plain_traceback)],
