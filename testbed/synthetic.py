@@ -56,15 +56,23 @@ def pair(distortion: tuple[float, ...] = BARREL) -> list[Camera]:
     ]
 
 
-@cache
 def pair_markings(distortion: tuple[float, ...] = BARREL) -> tuple[NDArray[np.float32], ...]:
     """Return what the pair sees of the markings of the crowned pitch: painted once for all tests of a process."""
+    return _markings_of_pair(distortion)
+
+
+def pair_frames(distortion: tuple[float, ...] = BARREL) -> tuple[NDArray[np.uint8], ...]:
+    """The frames of the pair: painted once for all tests of a process."""
+    return _frames_of_pair(distortion)
+
+
+@cache
+def _markings_of_pair(distortion: tuple[float, ...]) -> tuple[NDArray[np.float32], ...]:
     return tuple(_shared(paint_markings(CROWNED, one)) for one in pair(distortion))
 
 
 @cache
-def pair_frames(distortion: tuple[float, ...] = BARREL) -> tuple[NDArray[np.uint8], ...]:
-    """The frames of the pair: painted once for all tests of a process."""
+def _frames_of_pair(distortion: tuple[float, ...]) -> tuple[NDArray[np.uint8], ...]:
     seen = zip(pair(distortion), pair_markings(distortion), strict=True)
     return tuple(_shared(_coloured(one, {"white": paint})) for one, paint in seen)
 

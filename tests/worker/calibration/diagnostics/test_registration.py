@@ -34,7 +34,7 @@ FACING = camera("facing", (0.0, 48.0, 10.0), (0.0, 0.0))
 
 
 @cache
-def mask_of(name: str, crowned: bool = False) -> NDArray[np.float32]:
+def mask_of(name: str, crowned: bool) -> NDArray[np.float32]:
     chosen = {"left": LEFT, "right": RIGHT, "facing": FACING}[name]
     return paint_markings(CROWNED if crowned else PITCH, chosen)
 
@@ -131,7 +131,7 @@ def test_players_do_not_pull() -> None:
     random = np.random.default_rng(3)
     masks = []
     for one in (LEFT, RIGHT):
-        mask = mask_of(one.id).copy()
+        mask = mask_of(one.id, False).copy()
         feet = one.project(PITCH.lift(random.uniform(-11, 11, (5, 2))))
         for x, y in feet[np.isfinite(feet).all(axis=1)]:
             cv2.rectangle(mask, (int(x) - 2, int(y) - 18), (int(x) + 2, int(y)), 1.0, cv2.FILLED)
@@ -147,8 +147,8 @@ def test_cameras_that_share_no_marking_cannot_be_compared() -> None:
 
 
 def test_a_camera_that_sees_no_marking_cannot_be_compared() -> None:
-    black = np.zeros_like(mask_of("right"))
-    assert register_pair(PITCH, LEFT, RIGHT, mask_of("left"), black) is None
+    black = np.zeros_like(mask_of("right", False))
+    assert register_pair(PITCH, LEFT, RIGHT, mask_of("left", False), black) is None
     assert register_pair(PITCH, LEFT, RIGHT, black, black) is None
 
 
@@ -188,7 +188,7 @@ def test_a_halfway_line_that_has_slid_along_itself_is_no_registration(degrees: f
     # The circles are tens of metres apart, and the halfway line fits itself wherever it is.
     turn = rotation_matrices(np.radians([degrees, 0.0, 0.0]))
     pitched = RIGHT.with_pose(Pose(rotation_vectors(turn @ RIGHT.pose.matrix), RIGHT.pose.position))
-    assert register_pair(PITCH, LEFT, pitched, mask_of("left"), mask_of("right")) is None
+    assert register_pair(PITCH, LEFT, pitched, mask_of("left", False), mask_of("right", False)) is None
     assert shares_plenty(PITCH, LEFT, pitched)
 
 

@@ -14,10 +14,17 @@ OPPOSITE = camera("opposite", (10.0, 46.0, 12.0), (-5.0, 0.0))
 APART = camera("apart", (45.0, -50.0, 9.0), (60.0, -30.0))
 
 
+CAMERAS = {one.id: one for one in (LEFT, RIGHT, OPPOSITE, APART)}
+
+
 @cache
-def painted(camera_id, shaded=worn):
-    (one,) = (one for one in (LEFT, RIGHT, OPPOSITE, APART) if one.id == camera_id)
-    return shaded(PITCH, one, paint_frame(PITCH, one))
+def bare(camera_id):
+    return paint_frame(PITCH, CAMERAS[camera_id])
+
+
+@cache
+def painted(camera_id, shaded):
+    return shaded(PITCH, CAMERAS[camera_id], bare(camera_id))
 
 
 def ground(*cameras, shaded=worn):
@@ -72,7 +79,7 @@ def test_a_single_pose_has_to_be_seen_alike_too():
 
 
 def test_frames_that_are_lit_differently_are_as_alike():
-    frames = {one.id: painted(one.id) for one in (LEFT, RIGHT)}
+    frames = {one.id: painted(one.id, worn) for one in (LEFT, RIGHT)}
     dim = frames | {"right": (0.6 * frames["right"] + 10).astype(np.uint8)}
     as_it_is, dimmed = (
         SharedGround.of(PITCH, taken).compare([LEFT], [RIGHT]).correlations[0] for taken in (frames, dim)
