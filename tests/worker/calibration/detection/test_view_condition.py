@@ -1,6 +1,7 @@
 """Views that cannot be used are named, and nothing else is called so."""
 
 from dataclasses import replace
+from functools import cache
 
 import cv2
 import numpy as np
@@ -22,6 +23,7 @@ STORED = moved(CAMERA, rotation=(0.02, -0.02, 0.01), by=(0.1, 0.05, -0.05))
 """Some two degrees and a decimetre off, as a stored pose may be."""
 
 
+@cache
 def rendered(**conditions):
     seen = replace(Conditions.fair(world=5), **conditions)
     return render_frame(PITCH, CAMERA, seen, np.random.default_rng(1)).frame
