@@ -129,7 +129,15 @@ def asked(monkeypatch):
 
     monkeypatch.setattr(calibration, "calibrate", calibrate)
     monkeypatch.setattr(to_schemas, "Segmenter", Segmenter)
+    # What is drawn of rejected cameras takes half a second, and most tests do not look at it.
+    monkeypatch.setattr(pictures, "draw", lambda scene, names: {})
     return asked
+
+
+@pytest.fixture
+def drawn(asked, monkeypatch):
+    """For those who look at pictures."""
+    monkeypatch.setattr(pictures, "draw", draw)
 
 
 @pytest.fixture
@@ -207,6 +215,7 @@ ALL_PICTURES = {"preview", "preview_before", "seam", "birdseye"} | {
 MASKS = {"mask_left", "mask_right"}
 
 
+@pytest.mark.usefixtures("drawn")
 def test_the_outcome_is_what_was_found_with_pictures_and_provenance(venue, files, asked, means):
     steps = []
     outcome = solve(venue, files, Options(seed=7, pictures=True), means, steps.append)
@@ -222,6 +231,7 @@ def test_the_outcome_is_what_was_found_with_pictures_and_provenance(venue, files
     assert all(file.startswith(begins[picture_file(name)[-4:]]) for name, file in outcome.pictures.items())
 
 
+@pytest.mark.usefixtures("drawn")
 def test_pictures_of_poses_that_are_accepted_wait_for_who_looks_but_for_what_the_network_saw(
     venue, files, asked, means
 ):
@@ -245,6 +255,7 @@ def drawn_here(given, frames):
 @pytest.mark.parametrize(
     "options", try_first([Options(fit_ridge=True, fit_focal_length=True), Options(), Options(flat=True)])
 )
+@pytest.mark.usefixtures("drawn")
 def test_a_picture_drawn_later_is_the_one_that_the_job_draws(venue, files, asked, means, options):
     left, right = venue.cameras
     partly = left.model_copy(update={"ignore": [[[0, 100], [319, 100], [319, 179], [0, 179]]]})
@@ -460,6 +471,7 @@ def test_a_provider_that_is_not_installed_fails_and_says_what_to_set(venue, file
     assert failure.value.error["type"] == "/problems/provider-missing"
 
 
+@pytest.mark.usefixtures("drawn")
 def test_a_picture_that_cannot_be_drawn_costs_no_result(venue, files, asked, means, monkeypatch):
     def stitched(*_):
         raise ValueError
