@@ -6,21 +6,26 @@ more: each is drawn alone, and it is the one whose lines some camera explains be
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from worker.calibration.detection.paint import COMPARED_WIDTH_PX, draw_colours, sort_colours
-from worker.calibration.detection.segmentation import whole_frame
+from worker.calibration.detection.segmentation import Region, whole_frame
 from worker.calibration.geometry.camera import Frame
-from worker.calibration.records import Segment
 from worker.calibration.relocalisation.field_map import FieldMap
 from worker.calibration.relocalisation.propose import agreement_by_lines
 from worker.calibration.relocalisation.sought import SoughtCamera
 
 
 def draw_field_paint(
-    markings: FieldMap, sought: SoughtCamera, frame: Frame, segment: Segment, seed: int
+    markings: FieldMap,
+    sought: SoughtCamera,
+    frame: Frame,
+    segment: Callable[[Frame, Sequence[Region]], NDArray[np.uint8]],
+    seed: int,
 ) -> Frame | None:
     """Draw a frame (H, W, 3) with the paint alone that is most likely the field's.
 
