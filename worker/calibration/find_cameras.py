@@ -212,18 +212,22 @@ class _InOnePaint:
     seed: int
     seen: tuple[Channels, NDArray[np.float32]] | None = None
 
-    def relocalise(self) -> Relocalisation | None:
-        """Find the camera; None where the frame has one paint only, or no paint leads anywhere."""
+    def relocalise(self, in_all: Relocalisation) -> Relocalisation | None:
+        """Find the camera, or say why not; None unless its lines agree better with one paint than `in_all` colours."""
         painted = draw_field_paint(self.markings, self.sought, self.frame, self.segment, self.seed)
         if painted is None:
             return None
         seen = _seen(self.sought, [painted], [self.segment(painted, whole_frame(self.sought.size))])
         found = relocalise(self.pitch, self.markings, self.sought, *seen, self.seed)
-        if found.refusal is not None:
+        if _best_agreement(found) <= _best_agreement(in_all):
             return None
         self.seen = seen
         remark = "the lines of one colour alone were taken for the field's, others for those of other sports"
         return replace(found, remarks=[*found.remarks, remark])
+
+
+def _best_agreement(found: Relocalisation) -> float:
+    return max((candidate.agreement for candidate in found.candidates), default=0.0)
 
 
 def _with_lenses_of_others(
