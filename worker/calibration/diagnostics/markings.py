@@ -26,15 +26,15 @@ from worker.calibration.geometry.parameters import lens_parameters
 from worker.calibration.refinement.estimate import POSE_SIGMA
 from worker.calibration.refinement.least_squares import CLUSTER_POINTS, LEAST_NOISE
 from worker.calibration.refinement.uncertainty import RefinedPose
-from worker.calibration.robust import tukey_weights
+from worker.calibration.robust import SURE, tukey_weights
 
 Direction = Literal["outside", "inside", "right", "left", "far", "near"]
 OPPOSITE: dict[Direction, Direction] = {"outside": "inside", "right": "left", "far": "near"}
 FEWEST_MEASURED = 6
 """Fewest points of a marking, 25 cm apart, for an offset."""
 MEASURED = ("index", "pixel", "normal", "px_per_metre", "px_per_metre_up", "length_px", "trust")
-SURE, LEAST_OFF_M = 3.0, 0.03
-"""Limits from which a marking is elsewhere: in its sigmas, and in metres."""
+LEAST_OFF_M = 0.03
+"""Offset from which a marking is elsewhere, if it is sure as well."""
 USUAL_COUNTS = 1.0
 """Weight, in patches of line, of how patches usually differ beside those of the marking itself."""
 
