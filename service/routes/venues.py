@@ -14,7 +14,7 @@ from service.api.context import ByActor, Context, InContext, VenueIdPath
 from service.api.problems import validation_problem
 from service.intake import sources
 from service.routes.contract.attribution import hide_other_actor
-from service.routes.contract.documented import header_docs, needs_scope, problem_responses
+from service.routes.contract.documented import header_docs, needs_scope
 from service.routes.contract.exported import (
     DOCUMENTS,
     ExportQuery,
@@ -23,6 +23,7 @@ from service.routes.contract.exported import (
 )
 from service.routes.contract.guarded import Guarded
 from service.routes.contract.paged import NEXT_PAGE, next_page
+from service.routes.contract.problem_docs import OF_EXPORTS, problem_responses
 from service.routes.contract.restricted import OnlyVenues, lists_by_venue
 from service.routes.contract.tagged import TAGGED, IfNoneMatch, json_response, tagged_response
 from service.schemas import etags
@@ -52,6 +53,7 @@ from service.store.refusals import camera_of, no_refined_since, no_such_venue
 router = APIRouter(prefix="/venues", tags=["venues"], route_class=Guarded)
 # Required parts of a camera; its id is the name that it is patched by.
 WHOLE_CAMERA = ("image_size", "intrinsics", "pose")
+OF_PUT = ("venue-changed", "venue-id-mismatch", "callback-refused", "source-refused", "poses-refused")
 PATCH_BODY: dict[str, Any] = {
     "requestBody": {
         "required": True,
@@ -99,7 +101,7 @@ CameraPath = Annotated[str, Path(pattern=ID_PATTERN)]
     responses={
         200: header_docs("ETag"),
         201: {"model": ChangedVenue, **header_docs("ETag")},
-        **problem_responses(400, 404, 408, 412, 413, 415, 422),
+        **problem_responses(*OF_PUT),
     },
 )
 def put_venue(
@@ -120,7 +122,7 @@ def put_venue(
 @router.patch(
     "/{venue_id}",
     openapi_extra=needs_scope("admin") | PATCH_BODY,
-    responses={200: header_docs("ETag"), **problem_responses(400, 404, 408, 412, 413, 415, 422)},
+    responses={200: header_docs("ETag"), **problem_responses(*OF_PUT)},
 )
 def patch_venue(
     venue_id: VenueIdPath,
@@ -180,7 +182,7 @@ def list_venues(
     "/{venue_id}",
     openapi_extra=needs_scope("read"),
     response_model=Venue,
-    responses=TAGGED | problem_responses(404),
+    responses=TAGGED,
 )
 def get_venue(venue: ExistingVenue, if_none_match: IfNoneMatch = None) -> Response:
     """Return a venue with the poses in use."""
@@ -192,9 +194,9 @@ def get_venue(venue: ExistingVenue, if_none_match: IfNoneMatch = None) -> Respon
     "/{venue_id}/poses",
     openapi_extra=needs_scope("read"),
     response_class=Response,
-    responses=DOCUMENTS | problem_responses(404),
+    responses=DOCUMENTS | problem_responses(*OF_EXPORTS),
 )
-def venue_poses(
+def export_venue_poses(
     venue: ExistingVenue,
     context: InContext,
     wanted: Annotated[ExportQuery, Depends()],
@@ -211,9 +213,9 @@ def venue_poses(
     "/{venue_id}/history",
     openapi_extra=needs_scope("read"),
     response_model=History,
-    responses=TAGGED | {200: {"headers": TAGGED[200]["headers"] | NEXT_PAGE}} | problem_responses(404),
+    responses=TAGGED | {200: {"headers": TAGGED[200]["headers"] | NEXT_PAGE}},
 )
-def venue_history(
+def list_revisions(
     venue_id: ExistingVenueId,
     request: Request,
     context: InContext,
@@ -235,9 +237,9 @@ def venue_history(
     "/{venue_id}/cameras/{camera}/trend",
     openapi_extra=needs_scope("read"),
     response_model=Trend,
-    responses=TAGGED | problem_responses(404),
+    responses=TAGGED,
 )
-def camera_trend(
+def get_camera_trend(
     venue: ExistingVenue,
     camera: CameraPath,
     context: InContext,
@@ -254,8 +256,8 @@ def camera_trend(
     return tagged_response(body, if_none_match, json_response(body))
 
 
-@router.get("/{venue_id}/health", openapi_extra=needs_scope("read"), responses=problem_responses(404))
-def venue_health(venue_id: VenueIdPath, context: InContext) -> VenueHealth:
+@router.get("/{venue_id}/health", openapi_extra=needs_scope("read"))
+def get_venue_health(venue_id: VenueIdPath, context: InContext) -> VenueHealth:
     """Tell how a venue is doing: the alarms that ring, since when and why, and how far its cameras have drifted."""
     health = context.venues.health(venue_id)
     if health is None:
@@ -266,7 +268,10 @@ def venue_health(venue_id: VenueIdPath, context: InContext) -> VenueHealth:
 @router.post(
     "/{venue_id}/restore",
     openapi_extra=needs_scope("calibrate"),
-    responses={200: header_docs("ETag"), **problem_responses(400, 404, 408, 409, 412, 413, 415)},
+    responses={
+        200: header_docs("ETag"),
+        **problem_responses("revision-not-found", "revision-unfit", "venue-changed", "poses-refused"),
+    },
 )
 def restore_venue(
     venue_id: VenueIdPath,
@@ -288,9 +293,9 @@ def restore_venue(
 @router.post(
     "/{venue_id}/cameras/{camera}/adopt-refined",
     openapi_extra=needs_scope("calibrate"),
-    responses={200: header_docs("ETag"), **problem_responses(404, 412)},
+    responses={200: header_docs("ETag"), **problem_responses("refined-not-found", "venue-changed", "poses-refused")},
 )
-def adopt_refined(
+def adopt_refined_pose(
     venue_id: VenueIdPath,
     camera: CameraPath,
     response: Response,
@@ -308,9 +313,19 @@ def adopt_refined(
 @router.post(
     "/{venue_id}/adopt-field",
     openapi_extra=needs_scope("calibrate"),
-    responses={200: header_docs("ETag"), **problem_responses(400, 404, 408, 409, 412, 413, 415)},
+    responses={
+        200: header_docs("ETag"),
+        **problem_responses(
+            "job-not-found",
+            "field-number-not-found",
+            "field-number-refused",
+            "venue-moved-on",
+            "venue-changed",
+            "poses-refused",
+        ),
+    },
 )
-def adopt_field(
+def adopt_field_number(
     venue_id: VenueIdPath,
     wanted: AdoptField,
     response: Response,
@@ -333,10 +348,19 @@ def adopt_field(
     responses={
         200: header_docs("ETag"),
         201: {"model": Venue, **header_docs("ETag")},
-        **problem_responses(400, 404, 408, 409, 412, 413, 415, 422),
+        **problem_responses(
+            "job-not-found",
+            "poses-not-found",
+            "candidate-not-found",
+            "candidate-needed",
+            "candidate-refused",
+            "venue-moved-on",
+            "venue-changed",
+            "poses-refused",
+        ),
     },
 )
-def adopt_found(
+def adopt_found_cameras(
     venue_id: VenueIdPath,
     wanted: AdoptFound,
     request: Request,
@@ -359,7 +383,10 @@ def adopt_found(
 
 
 @router.delete(
-    "/{venue_id}", openapi_extra=needs_scope("admin"), status_code=204, responses=problem_responses(404, 409, 412)
+    "/{venue_id}",
+    openapi_extra=needs_scope("admin"),
+    status_code=204,
+    responses=problem_responses("venue-busy", "venue-changed"),
 )
 def delete_venue(venue_id: VenueIdPath, context: InContext, by: ByActor, precondition: IfMatch) -> None:
     """Forget a venue and the history of its poses. Its jobs stay, with frames and pictures: `DELETE /jobs/{id}`."""

@@ -15,12 +15,16 @@ from pydantic import (
     BeforeValidator,
     ConfigDict,
     Field,
+    GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
     StringConstraints,
     ValidationError,
     ValidationInfo,
     ValidatorFunctionWrapHandler,
-    WrapValidator,
 )
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema
+from pydantic_core.core_schema import with_info_wrap_validator_function
 
 from service.schemas.names import ID_PATTERN
 
@@ -66,14 +70,36 @@ def _or_a_newer_word(word: Any, check: ValidatorFunctionWrapHandler, info: Valid
         raise
 
 
-# Annotation of an enumeration that newer versions may extend.
-OPEN_WORD = WrapValidator(_or_a_newer_word)
+class _OpenWord:
+    """Annotation of an enumeration that newer versions may extend: in answers, clients have to expect other words."""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return with_info_wrap_validator_function(_or_a_newer_word, handler(source))
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        made = handler(schema)
+        words = made.pop("enum", None) or [made.pop("const")] if handler.mode == "serialization" else None
+        return made if words is None else {**made, "x-extensible-enum": words}
+
+
+OPEN_WORD = _OpenWord()
 
 
 class Schema(BaseModel):
-    """A model of the interface: unknown fields are errors, unless a document is read `TOLERANTLY`."""
+    """A model of the interface: unknown fields are errors, unless a document is read `TOLERANTLY`.
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    Its JSON schema is closed for what clients send, and open for answers, to which later versions may add fields.
+    """
+
+    # What an answer has is always there, at its default too.
+    model_config = ConfigDict(extra="forbid", frozen=True, json_schema_serialization_defaults_required=True)
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        made = handler(schema)
+        if handler.mode == "serialization":
+            handler.resolve_ref_schema(made).pop("additionalProperties", None)
+        return made
 
 
 class Unreadable(Schema):

@@ -5,12 +5,22 @@ from __future__ import annotations
 from datetime import datetime
 from typing import Annotated, Any, Literal, get_args
 
-from pydantic import ConfigDict, Field, ValidationInfo, ValidatorFunctionWrapHandler, WrapValidator
+from pydantic import (
+    ConfigDict,
+    Field,
+    GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
+    ValidationInfo,
+    ValidatorFunctionWrapHandler,
+)
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema
+from pydantic_core.core_schema import with_info_wrap_validator_function
 
 from service.schemas.actor import Attributed
 from service.schemas.base import OPEN_WORD, UNREADABLE, Schema, Unreadable, is_empty, is_none, is_tolerant
 from service.schemas.names import OPEN_STATUSES, JobKind, JobStatus
-from service.schemas.results import AnyResult
+from service.schemas.results import KIND, AnyResult
 
 
 class Progress(Schema):
@@ -45,10 +55,36 @@ class CallbackState(Schema):
     next_attempt_at: datetime | None = Field(description="Time of the next attempt; null unless waiting.")
 
 
-def _or_none_of_a_newer_kind(result: Any, check: ValidatorFunctionWrapHandler, info: ValidationInfo) -> Any:
-    """Return the result, or None for a kind of job that only a newer version knows."""
-    newer = is_tolerant(info) and info.data.get("kind") not in get_args(JobKind)
-    return None if newer else check(result)
+class _ResultOfAnyKind:
+    """Annotation of a result: None for a kind of job that only a newer version knows.
+
+    Earlier releases stored results without their kind.
+    """
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return with_info_wrap_validator_function(self._read, handler(source))
+
+    def _read(self, result: Any, check: ValidatorFunctionWrapHandler, info: ValidationInfo) -> Any:
+        kind = info.data.get("kind")
+        if is_tolerant(info) and kind not in get_args(JobKind):
+            return None
+        return check({"kind": kind} | result if isinstance(result, dict) else result)
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        made = handler(schema)
+        if handler.mode == "serialization":
+            known, nothing = made["anyOf"]
+            made = {**made, "anyOf": [known, OTHER_RESULT, nothing]}
+        return made
+
+
+OTHER_RESULT = {
+    "title": "OtherResult",
+    "description": "Result of a kind of job that later versions add.",
+    "type": "object",
+    "properties": {"kind": {"type": "string", "description": KIND}},
+    "required": ["kind"],
+}
 
 
 class Job(Schema):
@@ -95,7 +131,9 @@ class Job(Schema):
     started_at: datetime | None
     finished_at: datetime | None
     error: JobError | None
-    result: Annotated[AnyResult | None, WrapValidator(_or_none_of_a_newer_kind)]
+    result: Annotated[AnyResult | None, _ResultOfAnyKind()] = Field(
+        description="Result, by the kind of job; null before its end, and of a job that failed or was cancelled."
+    )
     callback: CallbackState | None = Field(
         None, description="Delivery of the callback; null before the end, without `callback_url`, and in callbacks."
     )

@@ -16,6 +16,7 @@ from service.schemas.names import FieldNumber, Verdict
 from service.schemas.options import Coordinates, Landmark
 from service.schemas.trend import Displacement
 
+KIND = "Kind of the job, which says what the result has."
 NO_CHOICE: Mapping[str, int | None] = MappingProxyType({})
 CPU_S: Any = Field({}, description="Core-seconds of all threads by stage, as in `timings_s`; {} from earlier releases.")
 
@@ -284,6 +285,7 @@ class AdoptableNumber(Schema):
 class Result(Schema):
     """Result of a calibration. Stitch errors: 1 px is 10 cm on the pitch; a single camera has none."""
 
+    kind: Literal["calibration"] = Field("calibration", description=KIND)
     verdict: Annotated[Verdict, OPEN_WORD] = Field(description="Acceptance of the poses: of all cameras, some or none.")
     accepted: bool = Field(description="True if the poses of all cameras are accepted.")
     rejected_because: str | None = Field(description="All reasons, with the cameras that they concern.")
@@ -355,6 +357,7 @@ class IntrinsicsResult(Schema):
     photos, which is more realistic. `warnings` say what to photograph next.
     """
 
+    kind: Literal["intrinsics"] = Field("intrinsics", description=KIND)
     image_size: list[int]
     intrinsics: Intrinsics
     terms: list[str]
@@ -411,6 +414,7 @@ class LocateSigma(Schema):
 class LocateResult(Schema):
     """A first pose from clicked points. `accepted`: a calibration can start from it, with these `intrinsics`."""
 
+    kind: Literal["locate"] = Field("locate", description=KIND)
     accepted: bool
     rejected_because: str | None
     camera: Id
@@ -448,6 +452,7 @@ class FieldResult(Schema):
     `accepted`: it may replace the venue's field; nothing is replaced automatically.
     """
 
+    kind: Literal["field"] = Field("field", description=KIND)
     accepted: bool
     rejected_because: str | None
     field: FieldOfPlay
@@ -514,6 +519,7 @@ class FindResult(Schema):
     Nothing is stored automatically: `POST /venues/{id}/adopt-found` stores the cameras.
     """
 
+    kind: Literal["find"] = Field("find", description=KIND)
     accepted: bool
     rejected_because: str | None
     cameras: list[FoundCameraResult]
@@ -539,4 +545,4 @@ class FindResult(Schema):
         return {camera: candidates[camera][n - 1] for camera, n in {**first, **choice}.items() if n is not None}
 
 
-AnyResult = Result | IntrinsicsResult | LocateResult | FieldResult | FindResult
+AnyResult = Annotated[Result | IntrinsicsResult | LocateResult | FieldResult | FindResult, Field(discriminator="kind")]
