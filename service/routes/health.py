@@ -60,7 +60,9 @@ async def get_metrics(context: InContext) -> Response:
 
 
 @router.get("/problems/{kind}", openapi_extra=FOR_ALL, responses=problem_responses("not-found"))
-async def explain_problem(kind: Annotated[str, Path(max_length=64)], response: Response) -> dict[str, str | int]:
+async def explain_problem(
+    kind: Annotated[str, Path(max_length=64, description="Last part of the `type`.")], response: Response
+) -> dict[str, str | int]:
     """Explain what the `type` of a problem means; browsers (`Accept: text/html`) get a page."""
     response.headers.update(OF_PROGRAMS)
     if kind not in PROBLEM_TYPES:
@@ -69,7 +71,9 @@ async def explain_problem(kind: Annotated[str, Path(max_length=64)], response: R
 
 
 @router.get("/refusals/{reason}", openapi_extra=FOR_ALL, responses=problem_responses("not-found"))
-async def explain_refusal(reason: Annotated[str, Path(max_length=64)], response: Response) -> dict[str, str]:
+async def explain_refusal(
+    reason: Annotated[str, Path(max_length=64, description="Last part of the `refusal`.")], response: Response
+) -> dict[str, str]:
     """Explain what the `refusal` of a camera means: what it looks like, and what to do. Browsers get a page."""
     response.headers.update(OF_PROGRAMS)
     if reason not in REFUSAL_REASONS:

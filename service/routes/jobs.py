@@ -15,14 +15,14 @@ from starlette.concurrency import run_in_threadpool
 from service.api.context import ByActor, Context, InContext, JobIdPath
 from service.routes.contract.attribution import hide_other_asker
 from service.routes.contract.documented import needs_scope
-from service.routes.contract.exported import DOCUMENTS, ExportQuery, export_response, with_refined_poses
+from service.routes.contract.exported import DOCUMENTS, ExportQuery, FormatQuery, export_response, with_refined_poses
 from service.routes.contract.guarded import Guarded
-from service.routes.contract.paged import NEXT_PAGE, next_page
+from service.routes.contract.paged import CURSOR, LIMIT, NEXT_PAGE, next_page
 from service.routes.contract.problem_docs import OF_EXPORTS, problem_responses
 from service.routes.contract.restricted import OnlyVenues, lists_by_venue
 from service.routes.contract.tagged import TAGGED, IfNoneMatch, tagged_response
 from service.schemas.job import Job, Jobs
-from service.schemas.names import ID_PATTERN, JOB_ID_PATTERN, OPEN_STATUSES, FormatName, JobKind, JobStatus, ListFields
+from service.schemas.names import ID_PATTERN, JOB_ID_PATTERN, OPEN_STATUSES, JobKind, JobStatus, ListFields
 from service.schemas.problems import Problem
 from service.schemas.results import Result
 from service.store.blobs import BLOB_OUTAGES
@@ -86,11 +86,11 @@ def list_jobs(
     only: OnlyVenues,
     request: Request,
     response: Response,
-    venue: Annotated[str | None, Query(pattern=ID_PATTERN)] = None,
-    status: JobStatus | None = None,
-    kind: JobKind | None = None,
-    limit: Annotated[int, Query(ge=1, le=200)] = 50,
-    cursor: Annotated[str | None, Query(pattern=JOB_ID_PATTERN)] = None,
+    venue: Annotated[str | None, Query(pattern=ID_PATTERN, description="Only jobs of this venue.")] = None,
+    status: Annotated[JobStatus | None, Query(description="Only jobs in this state.")] = None,
+    kind: Annotated[JobKind | None, Query(description="Only jobs of this kind.")] = None,
+    limit: Annotated[int, Query(ge=1, le=200, description=LIMIT)] = 50,
+    cursor: Annotated[str | None, Query(pattern=JOB_ID_PATTERN, description=CURSOR)] = None,
     fields: Annotated[ListFields, Query(description="`summary`: a line of each, in `summaries`.")] = "all",
 ) -> Jobs:
     """List jobs, newest first, in pages; with a key for some venues, theirs."""
@@ -241,7 +241,7 @@ def export_job_poses(
     job: ExistingJob,
     context: InContext,
     wanted: Annotated[ExportQuery, Depends()],
-    form: Annotated[FormatName, Query(alias="format")] = "json",
+    form: FormatQuery = "json",
 ) -> Response:
     """Export the poses that a job found, accepted or not, to another tool's format."""
     venue = context.jobs.posed(job.id)

@@ -7,14 +7,13 @@ from typing import Annotated
 from fastapi import APIRouter, Path, Response
 from starlette.concurrency import run_in_threadpool
 
-from service.api.context import Context, InContext
+from service.api.context import CameraIdPath, Context, InContext
 from service.routes.contract.documented import BINARY, needs_scope
 from service.routes.contract.guarded import Guarded
 from service.routes.contract.problem_docs import problem_responses
 from service.routes.jobs import ExistingJob
 from service.schemas.file_kinds import PNG_START
 from service.schemas.job import Job
-from service.schemas.names import ID_PATTERN
 from service.schemas.problems import Problem
 from service.store.blobs import DamagedBlob
 from service.store.jobs.files import picture_file
@@ -22,7 +21,6 @@ from service.store.jobs.queries import Pictures
 
 router = APIRouter(prefix="/jobs", tags=["jobs"], route_class=Guarded)
 
-CameraPath = Annotated[str, Path(pattern=ID_PATTERN)]
 PNG, JPEG = "image/png", "image/jpeg"
 # Name of the route, address below that of the job, description. The picture's name is the address without its suffix,
 # with underscores for slashes.
@@ -64,11 +62,14 @@ def _show(route: str, address: str, shows: str) -> None:
     async def of_job(job: ExistingJob, context: InContext) -> Response:
         return await _picture(context, job, name)
 
-    async def of_camera(job: ExistingJob, camera: CameraPath, context: InContext) -> Response:
+    async def of_camera(job: ExistingJob, camera: CameraIdPath, context: InContext) -> Response:
         return await _picture(context, job, name.format(camera=camera))
 
     async def of_candidate(
-        job: ExistingJob, camera: CameraPath, number: Annotated[int, Path(ge=1, le=100)], context: InContext
+        job: ExistingJob,
+        camera: CameraIdPath,
+        number: Annotated[int, Path(ge=1, le=100, description="Number of the candidate, from 1.")],
+        context: InContext,
     ) -> Response:
         return await _picture(context, job, name.format(camera=camera, number=number))
 
@@ -115,7 +116,11 @@ for each in PICTURES:
         **problem_responses("picture-not-found", "frames-deleted"),
     },
 )
-def get_frame(job: ExistingJob, number: Annotated[int, Path(ge=0, le=10_000)], context: InContext) -> Response:
+def get_frame(
+    job: ExistingJob,
+    number: Annotated[int, Path(ge=0, le=10_000, description="Number of the frame, from 0.")],
+    context: InContext,
+) -> Response:
     """Return a frame or photo of a job as it came. `frames` of the job has the addresses of all."""
     path = context.jobs.frame(job.id, number)
     try:

@@ -6,11 +6,11 @@ from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime, time
 from typing import Annotated, Any, Literal
 
-from fastapi import APIRouter, Body, Depends, Header, Path, Query, Request, Response
+from fastapi import APIRouter, Body, Depends, Header, Query, Request, Response
 from pydantic import ValidationError
 
 from service.api.auth import missing_scope
-from service.api.context import ByActor, Context, InContext, VenueIdPath
+from service.api.context import ByActor, CameraIdPath, Context, InContext, VenueIdPath
 from service.api.problems import validation_problem
 from service.intake import sources
 from service.routes.contract.attribution import hide_other_actor
@@ -18,11 +18,12 @@ from service.routes.contract.documented import header_docs, needs_scope
 from service.routes.contract.exported import (
     DOCUMENTS,
     ExportQuery,
+    FormatQuery,
     export_response,
     with_refined_poses,
 )
 from service.routes.contract.guarded import Guarded
-from service.routes.contract.paged import NEXT_PAGE, next_page
+from service.routes.contract.paged import CURSOR, LIMIT, NEXT_PAGE, next_page
 from service.routes.contract.problem_docs import OF_EXPORTS, problem_responses
 from service.routes.contract.restricted import OnlyVenues, lists_by_venue
 from service.routes.contract.tagged import TAGGED, IfNoneMatch, json_response, tagged_response
@@ -33,7 +34,7 @@ from service.schemas.geometry import PoseIn
 from service.schemas.health import VenueHealth
 from service.schemas.history import AdoptField, AdoptFound, History, Restore
 from service.schemas.merge_patch import MEDIA_TYPE, apply_merge_patch
-from service.schemas.names import ID_PATTERN, FormatName, ListFields
+from service.schemas.names import ID_PATTERN, ListFields
 from service.schemas.problems import Problem
 from service.schemas.source_urls import SourceSecrets
 from service.schemas.trend import Trend
@@ -81,18 +82,21 @@ ExistingVenue = Annotated[Venue, Depends(existing_venue)]
 ExistingVenueId = Annotated[str, Depends(_existing_venue_id)]
 
 
-async def _if_match(if_match: Annotated[str | None, Header()] = None) -> Precondition:
+IfMatchHeader = Annotated[str | None, Header(description="Only if the venue has this `ETag`.")]
+
+
+async def _if_match(if_match: IfMatchHeader = None) -> Precondition:
     return Precondition(if_match)
 
 
 async def _either_match(
-    if_match: Annotated[str | None, Header()] = None, if_none_match: Annotated[str | None, Header()] = None
+    if_match: IfMatchHeader = None,
+    if_none_match: Annotated[str | None, Header(description="`*`: only if the venue is not stored yet.")] = None,
 ) -> Precondition:
     return Precondition(if_match, if_none_match)
 
 
 IfMatch = Annotated[Precondition, Depends(_if_match)]
-CameraPath = Annotated[str, Path(pattern=ID_PATTERN)]
 
 
 @router.put(
@@ -158,8 +162,8 @@ def list_venues(
     only: OnlyVenues,
     request: Request,
     response: Response,
-    limit: Annotated[int, Query(ge=1, le=1000)] = 100,
-    cursor: Annotated[str | None, Query(pattern=ID_PATTERN)] = None,
+    limit: Annotated[int, Query(ge=1, le=1000, description=LIMIT)] = 100,
+    cursor: Annotated[str | None, Query(pattern=ID_PATTERN, description=CURSOR)] = None,
     q: Annotated[Name | None, Query(min_length=1, description="Only those whose id or name contains this.")] = None,
     state: Annotated[
         Literal["ok", "alarm"] | None, Query(description="Only those of which an alarm rings, or none does.")
@@ -200,7 +204,7 @@ def export_venue_poses(
     venue: ExistingVenue,
     context: InContext,
     wanted: Annotated[ExportQuery, Depends()],
-    form: Annotated[FormatName, Query(alias="format")] = "json",
+    form: FormatQuery = "json",
 ) -> Response:
     """Export the poses in use to another tool's format; with `lens=refined` those of the last accepted job."""
     if wanted.lens == "refined":
@@ -219,8 +223,8 @@ def list_revisions(
     venue_id: ExistingVenueId,
     request: Request,
     context: InContext,
-    limit: Annotated[int, Query(ge=1, le=1000)] = 50,
-    cursor: Annotated[int | None, Query(ge=1, le=2**31 - 1)] = None,
+    limit: Annotated[int, Query(ge=1, le=1000, description=LIMIT)] = 50,
+    cursor: Annotated[int | None, Query(ge=1, le=2**31 - 1, description=CURSOR)] = None,
     if_none_match: IfNoneMatch = None,
 ) -> Response:
     """List every change of the poses with its cause, newest first, and how far each camera moved and has drifted."""
@@ -241,7 +245,7 @@ def list_revisions(
 )
 def get_camera_trend(
     venue: ExistingVenue,
-    camera: CameraPath,
+    camera: CameraIdPath,
     context: InContext,
     since: Annotated[Day | None, Query(description="The first night to tell, a day of UTC; without it, all.")] = None,
     if_none_match: IfNoneMatch = None,
@@ -297,7 +301,7 @@ def restore_venue(
 )
 def adopt_refined_pose(
     venue_id: VenueIdPath,
-    camera: CameraPath,
+    camera: CameraIdPath,
     response: Response,
     context: InContext,
     by: ByActor,

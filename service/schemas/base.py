@@ -15,16 +15,14 @@ from pydantic import (
     BeforeValidator,
     ConfigDict,
     Field,
-    GetCoreSchemaHandler,
     GetJsonSchemaHandler,
     StringConstraints,
     ValidationError,
     ValidationInfo,
     ValidatorFunctionWrapHandler,
+    WrapValidator,
 )
 from pydantic.json_schema import JsonSchemaValue
-from pydantic_core import CoreSchema
-from pydantic_core.core_schema import with_info_wrap_validator_function
 
 from service.schemas.names import ID_PATTERN
 
@@ -70,19 +68,16 @@ def _or_a_newer_word(word: Any, check: ValidatorFunctionWrapHandler, info: Valid
         raise
 
 
-class _OpenWord:
+class _OpenWord(WrapValidator):
     """Annotation of an enumeration that newer versions may extend: in answers, clients have to expect other words."""
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return with_info_wrap_validator_function(_or_a_newer_word, handler(source))
-
-    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+    def __get_pydantic_json_schema__(self, schema: Any, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
         made = handler(schema)
         words = made.pop("enum", None) or [made.pop("const")] if handler.mode == "serialization" else None
         return made if words is None else {**made, "x-extensible-enum": words}
 
 
-OPEN_WORD = _OpenWord()
+OPEN_WORD = _OpenWord(_or_a_newer_word)
 
 
 class Schema(BaseModel):
@@ -95,7 +90,7 @@ class Schema(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, json_schema_serialization_defaults_required=True)
 
     @classmethod
-    def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+    def __get_pydantic_json_schema__(cls, schema: Any, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
         made = handler(schema)
         if handler.mode == "serialization":
             handler.resolve_ref_schema(made).pop("additionalProperties", None)
@@ -105,8 +100,10 @@ class Schema(BaseModel):
 class Unreadable(Schema):
     """A stored entry that this version cannot read, and the reason."""
 
-    id: str
-    why: str = Field(examples=["field: the ridge must be 0 to 3 m high, not -0.001 m"])
+    id: str = Field(description="Id of the entry.")
+    why: str = Field(
+        examples=["field: the ridge must be 0 to 3 m high, not -0.001 m"], description="Reason why it cannot be read."
+    )
 
 
 UNREADABLE = "Entries of this page that are stored but cannot be read; absent if there are none."

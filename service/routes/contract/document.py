@@ -40,32 +40,32 @@ class DocumentedApp(FastAPI):
 
 
 def document_webhooks(app: FastAPI) -> None:
-    """Document what the service sends to the addresses that it is given. Each function returns what is sent."""
+    """Document what the service sends to the addresses that it is given. The `response_model` is what is sent."""
 
-    @app.webhooks.post("job-ended", operation_id="receive_job_end", tags=["jobs"])
-    def job_ended() -> JobEvent:
+    @app.webhooks.post("job-ended", operation_id="receive_job_end", response_model=JobEvent, tags=["jobs"])
+    def job_ended() -> None:
         """Sent when a job with a `callback_url` has ended, until it is answered with 2xx: ten more times in a day.
 
         `webhook-id`, `webhook-timestamp` and `webhook-signature` are those of Standard Webhooks (`v1`, HMAC-SHA256 with
         the secret of the service). The same event can arrive more than once; its `webhook-id` is the job's.
         """
 
-    @app.webhooks.post("alarm", operation_id="receive_alarm", tags=["venues"])
-    def alarm() -> AlarmEvent:
+    @app.webhooks.post("alarm", operation_id="receive_alarm", response_model=AlarmEvent, tags=["venues"])
+    def alarm() -> None:
         """Sent once when an alarm of a venue begins and once when it is over, signed and retried as `job-ended` is."""
 
-    @app.webhooks.post("venue-event", operation_id="receive_venue_event", tags=["venues"])
-    def venue_event() -> Event:
+    @app.webhooks.post("venue-event", operation_id="receive_venue_event", response_model=Event, tags=["venues"])
+    def venue_event() -> None:
         """Sent to each of a venue's `webhooks` that wants it, signed and retried as `job-ended` is.
 
         One that had to be tried again can arrive after a later one: of two with poses, the higher `revision` holds.
         Later versions send events of other types, which a client answers with 2xx and ignores.
         """
 
-    @app.webhooks.post(PARTS_OF_FORMS)
+    @app.webhooks.post(PARTS_OF_FORMS, response_model=ProblemDetails)
     def parts_of_forms(
         sent: Options | IntrinsicsOptions | LocateOptions | FieldOptions | FindOptions | SoughtSite,
-    ) -> ProblemDetails:
+    ) -> None:
         """Name the schemas of forms and problems."""
 
 
@@ -84,6 +84,9 @@ def _finished(document: dict[str, Any]) -> dict[str, Any]:
         for operation in path.values():
             operation["summary"] = _first_sentence(operation["description"])
     document["components"]["securitySchemes"] = SECURITY_SCHEMES
+    # FastAPI's own, which no route answers.
+    for unused in ("HTTPValidationError", "ValidationError"):
+        document["components"]["schemas"].pop(unused, None)
     return _with_short_names(document)
 
 

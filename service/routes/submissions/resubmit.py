@@ -27,6 +27,7 @@ OF_COPIES = (
     "job-of-newer-version",
     "venue-not-found",
     "venue-replaced",
+    "venue-stored",
     "venue-busy",
     "queue-full",
     "disk-full",
