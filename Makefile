@@ -69,6 +69,7 @@ check: setup
 	$(BIN)/lint-imports
 	$(BIN)/deptry .
 	$(BIN)/python -m tests.openapi
+	$(BIN)/python -m tests.prose
 
 # What an earlier build left in build/lib would go into the wheel.
 wheel: setup

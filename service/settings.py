@@ -1,4 +1,4 @@
-"""Every setting of the service and its worker: environment variables `ESC_...`, or a `.env` file."""
+"""Every setting: environment variables `ESC_...`, or a `.env` file."""
 
 from __future__ import annotations
 

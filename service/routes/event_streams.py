@@ -86,7 +86,7 @@ async def stream_venue_events(
                 await context.venue_watch.until(venue_id, number.__lt__, LONGEST_POLL_INTERVAL_S)
     except (*DATABASE_OUTAGES, UnreadableRow):
         # The client connects again, as after any stream that broke off.
-        log.warning("cannot tell of a venue", exc_info=True)
+        log.warning("cannot stream events of a venue", exc_info=True)
 
 
 def _server_sent_event(event: NumberedEvent) -> ServerSentEvent:

@@ -78,7 +78,7 @@ async def stream_live_poses(venue: ExistingVenue, context: InContext) -> AsyncIt
                 return
     except DATABASE_OUTAGES:
         # The client connects again, as after any stream that broke off.
-        log.warning("cannot tell of live poses", exc_info=True)
+        log.warning("cannot stream live poses", exc_info=True)
 
 
 @router.get("/history", openapi_extra=needs_scope("read"))

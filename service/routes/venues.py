@@ -166,7 +166,7 @@ def list_venues(
     cursor: Annotated[str | None, Query(pattern=ID_PATTERN, description=CURSOR)] = None,
     q: Annotated[Name | None, Query(min_length=1, description="Only those whose id or name contains this.")] = None,
     state: Annotated[
-        Literal["ok", "alarm"] | None, Query(description="Only those of which an alarm rings, or none does.")
+        Literal["ok", "alarm"] | None, Query(description="Only those with an active alarm, or without one.")
     ] = None,
     fields: Annotated[ListFields, Query(description="`summary`: a line of each, in `summaries`.")] = "all",
 ) -> Venues:

@@ -38,9 +38,9 @@ class Options(Handling):
     )
     search: Annotated[Literal["auto", "wide", "anywhere"], OPEN_WORD] = Field(
         "auto",
-        description="`auto`: no search if the cameras stand almost as stored, else a search around the stored poses, "
-        "and last, for a camera whose lines are clearly visible but not where its pose expects them, a search at its "
-        "stored position in any direction. `wide`: always around the stored poses, and nowhere else. `anywhere`: for "
+        description="`auto`: no search if the cameras stand almost as stored, else a search around the stored poses. "
+        "Last, a camera whose lines are clearly visible but not where its pose expects them is searched for at its "
+        "stored position, in any direction. `wide`: always around the stored poses, and nowhere else. `anywhere`: for "
         "every camera, first at its stored position and then elsewhere.",
     )
     seed: Annotated[Integer, Field(ge=0, le=2**53 - 1)] | None = Field(None, description="Absent: one is chosen.")

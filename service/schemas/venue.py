@@ -320,9 +320,9 @@ class ChangedVenue(Venue):
 
     warnings: list[str] = Field(
         [],
-        description="Warnings about poses that do not see the field, with the convention that would explain them; "
-        "about lenses without a `sigma`, without rays for a part of the picture, or of another resolution; and about "
-        "a field of default size without a `sigma`. Not stored: GET does not show them, and PUT ignores them.",
+        description="Warnings about poses that do not see the field, with the convention that would explain them. "
+        "Others are about lenses without a `sigma`, without rays for a part of the picture, or of another resolution, "
+        "and about a field of default size without a `sigma`. Not stored: GET does not show them, PUT ignores them.",
         examples=[
             [
                 "camera west: its lens has no sigma and is taken to be as sure as a good board leaves it, "
