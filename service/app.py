@@ -42,7 +42,7 @@ def create_app(settings: Settings) -> FastAPI:
         summary="Keeps fixed multi-camera installations on sports fields calibrated.",
         description=DESCRIPTION,
         openapi_tags=TAGS,
-        servers=[{"url": settings.root_path or "/", "description": "This service."}],
+        servers=[{"url": settings.root_path or "/"}],
         contact={"name": "The ESC maintainers"},
         license_info={"name": "Apache License 2.0", "identifier": "Apache-2.0"},
         version=version("esc-calibration"),
