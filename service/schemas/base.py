@@ -7,6 +7,7 @@ stored rows) are read by the same models with `TOLERANTLY`.
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 from datetime import date
 from typing import Annotated, Any
 
@@ -78,6 +79,26 @@ class _OpenWord(WrapValidator):
 
 
 OPEN_WORD = _OpenWord(_or_a_newer_word)
+
+
+@dataclass(frozen=True)
+class OpenChoice:
+    """Annotation of a union that newer versions may extend: in answers, clients have to expect other objects.
+
+    `discriminator`: the member that says which object it is; `title`, `description`: of the objects to come.
+    """
+
+    discriminator: str
+    title: str
+    description: str
+
+    def __get_pydantic_json_schema__(self, schema: Any, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        known = handler(schema)
+        if handler.mode == "validation":
+            return known
+        word = {"type": "string", "description": "A word of a later version."}
+        other = {"title": self.title, "description": self.description, "type": "object"}
+        return {"anyOf": [known, {**other, "properties": {self.discriminator: word}, "required": [self.discriminator]}]}
 
 
 class Schema(BaseModel):

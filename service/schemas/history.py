@@ -27,9 +27,11 @@ class NumberChange(Schema):
     after: float = Field(description="Value after, m.")
 
 
-# Causes of revisions: put: PUT or PATCH; calibrated: an accepted calibration; recovered: a calibration that found a
-# knocked camera again; accepted: a result accepted by hand; restored: an older revision; adopted: the refined pose and
-# lens of a camera, or a dimension of the field; found: cameras that a search found from their frames.
+CAUSES = (
+    "`put`: PUT or PATCH; `calibrated`: an accepted calibration; `recovered`: one that found a knocked camera; "
+    "`accepted`: a result accepted by hand; `restored`: an older revision; `adopted`: the refined pose and lens of a "
+    "camera, or a dimension of the field; `found`: a search for cameras."
+)
 Cause = Literal["put", "calibrated", "recovered", "accepted", "restored", "adopted", "found"]
 
 
@@ -68,7 +70,7 @@ class Revision(Schema):
 
     revision: int = Field(description="Number of the revision, from 1; the newest is in use.")
     at: datetime = Field(description="Time since which it is in use.")
-    cause: Annotated[Cause, OPEN_WORD] = Field(description="Cause of the change.")
+    cause: Annotated[Cause, OPEN_WORD] = Field(description=f"Cause of the change: {CAUSES}")
     job: str | None = Field(
         description="Job that found these poses; for a restored revision, the job whose poses were rejected by hand."
     )

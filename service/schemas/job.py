@@ -8,17 +8,15 @@ from typing import Annotated, Any, Literal, get_args
 from pydantic import (
     ConfigDict,
     Field,
-    GetJsonSchemaHandler,
     ValidationInfo,
     ValidatorFunctionWrapHandler,
     WrapValidator,
 )
-from pydantic.json_schema import JsonSchemaValue
 
 from service.schemas.actor import Attributed
 from service.schemas.base import OPEN_WORD, UNREADABLE, Schema, Unreadable, is_empty, is_none, is_tolerant
 from service.schemas.names import OPEN_STATUSES, JobKind, JobStatus
-from service.schemas.results import KIND, AnyResult
+from service.schemas.results import AnyResult
 
 
 class Progress(Schema):
@@ -64,26 +62,6 @@ def _read_result(result: Any, check: ValidatorFunctionWrapHandler, info: Validat
         return None
     # Earlier releases stored results without their kind.
     return check({"kind": kind} | result if isinstance(result, dict) else result)
-
-
-class _ResultOfAnyKind(WrapValidator):
-    """Annotation of a result: in answers, clients have to expect those of other kinds."""
-
-    def __get_pydantic_json_schema__(self, schema: Any, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        made = handler(schema)
-        if handler.mode == "serialization":
-            known, nothing = made["anyOf"]
-            made = {**made, "anyOf": [known, OTHER_RESULT, nothing]}
-        return made
-
-
-OTHER_RESULT = {
-    "title": "OtherResult",
-    "description": "Result of a kind of job that later versions add.",
-    "type": "object",
-    "properties": {"kind": {"type": "string", "description": KIND}},
-    "required": ["kind"],
-}
 
 
 class Job(Schema):
@@ -132,7 +110,7 @@ class Job(Schema):
     started_at: datetime | None = Field(description="Time of its last start; null while queued.")
     finished_at: datetime | None = Field(description="Time of its end; null while open.")
     error: JobError | None
-    result: Annotated[AnyResult | None, _ResultOfAnyKind(_read_result)] = Field(
+    result: Annotated[AnyResult | None, WrapValidator(_read_result)] = Field(
         description="Result, by the kind of job; null before its end, and of a job that failed or was cancelled."
     )
     callback: CallbackState | None = Field(

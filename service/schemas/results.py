@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from service.schemas.base import OPEN_WORD, Id, Schema
+from service.schemas.base import OPEN_WORD, Id, OpenChoice, Schema
 from service.schemas.field import FieldOfPlay
 from service.schemas.geometry import Intrinsics, Light, Moved, Pose, Row
 from service.schemas.names import FieldNumber, Verdict
@@ -42,7 +42,11 @@ class View(Schema):
     """Usability of a camera's frame, and what is wrong with it."""
 
     usable: bool = Field(description="True if the frame can be calibrated.")
-    cause: Annotated[Cause, OPEN_WORD] | None = Field(None, description="What is wrong with it.")
+    cause: Annotated[Cause, OPEN_WORD] | None = Field(
+        None,
+        description="What is wrong with it, see `GET /refusals/view`; `other-camera` and `no-markings-in-view` are "
+        "refusals of their own.",
+    )
     where: str | None = Field(None, description="Affected part of the visible field.")
     detail: str = Field(description="The same in words, and what to do.")
     lines_found: float | None = Field(
@@ -531,4 +535,8 @@ class FindResult(Schema):
         return {camera: candidates[camera][n - 1] for camera, n in {**first, **choice}.items() if n is not None}
 
 
-AnyResult = Annotated[Result | IntrinsicsResult | LocateResult | FieldResult | FindResult, Field(discriminator="kind")]
+AnyResult = Annotated[
+    Result | IntrinsicsResult | LocateResult | FieldResult | FindResult,
+    Field(discriminator="kind"),
+    OpenChoice("kind", "OtherResult", "Result of a kind of job that later versions add."),
+]

@@ -9,10 +9,10 @@ from typing import Annotated, Literal, get_args
 from pydantic import Field
 
 from service.schemas.actor import Attributed
-from service.schemas.base import OPEN_WORD, Id, Schema
+from service.schemas.base import OPEN_WORD, Id, OpenChoice, Schema
 from service.schemas.geometry import PosedCamera, Row
 from service.schemas.health import AlarmEvent
-from service.schemas.history import Cause
+from service.schemas.history import CAUSES, Cause
 from service.schemas.job import JobEvent
 from service.schemas.names import EventKind
 
@@ -25,7 +25,7 @@ class Poses(Schema):
 
     venue: Id = Field(description="Id of the venue.")
     revision: int = Field(description="Revision in the history of the venue; the highest one is current.")
-    cause: Annotated[Cause, OPEN_WORD] = Field(description="Cause of the revision.")
+    cause: Annotated[Cause, OPEN_WORD] = Field(description=f"Cause of the revision: {CAUSES}")
     job: str | None = Field(
         description="Job that found these poses; for a restored revision, the job whose poses were rejected by hand."
     )
@@ -62,7 +62,11 @@ class VenueEvent(Attributed):
     data: VenueChange
 
 
-Event = Annotated[PosesEvent | VenueEvent | JobEvent | AlarmEvent, Field(discriminator="type")]
+Event = Annotated[
+    PosesEvent | VenueEvent | JobEvent | AlarmEvent,
+    Field(discriminator="type"),
+    OpenChoice("type", "OtherEvent", "Event that later versions add: ignore it."),
+]
 EVENT_MODELS: tuple[type[Attributed], ...] = get_args(get_args(Event)[0])
 # Clients skip other types, of newer versions.
 EVENT_TYPES = frozenset(word for event in EVENT_MODELS for word in get_args(event.model_fields["type"].annotation))
