@@ -209,7 +209,7 @@ class Settings(BaseSettings):
         default_factory=cores.usable_cores,
         ge=1,
         description="Threads of a job, for inference and pictures. The default respects CPU affinity (`taskset`) "
-        "and the CPU quota of the container or unit.",
+        "and the CPU quota of the container or unit. Results do not depend on it.",
     )
     job_timeout_s: float = Field(600, gt=0, description="Time limit of jobs without `timeout_s`.")
     job_program: list[str] = Field(
