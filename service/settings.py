@@ -106,9 +106,9 @@ class Settings(BaseSettings):
     connections: int = Field(
         4000,
         ge=1,
-        description="Clients connected to one API process; beyond it, the longest idle ones are disconnected. "
-        "Each is an open file: a lower limit of open files (`LimitNOFILE`, `ulimits`, `ulimit -Hn`) "
-        "admits fewer, as the log says at the start.",
+        description="Clients connected to one API process; beyond it, the longest idle ones are disconnected. A "
+        "lower limit of open files (`LimitNOFILE`, `ulimits`, `ulimit -Hn`) admits fewer, as the log "
+        "says at the start.",
     )
     followers: int = Field(
         1000, ge=1, description="Clients that follow venues at one API process; more are answered with 503."
@@ -124,7 +124,7 @@ class Settings(BaseSettings):
     max_job_pixels: int = Field(
         500_000_000,
         gt=0,
-        description="Pixels of all frames of one job, which are kept decoded; 500 million are 60 frames of 4K.",
+        description="Pixels of all frames of one job; 500 million are 60 frames of 4K.",
     )
     job_memory_mb: float = Field(
         6000,
@@ -132,7 +132,7 @@ class Settings(BaseSettings):
         description="Memory limit of one program that decodes frames, on Linux and unless `ESC_PROVIDER` is "
         "`cuda`; a job that needs more fails. `ESC_MAX_JOB_PIXELS` needs 4500.",
     )
-    max_frames_per_camera: int = Field(16, ge=1, description="Frames of one camera in one job, which are fused.")
+    max_frames_per_camera: int = Field(16, ge=1, description="Frames of one camera in one job.")
     stall_timeout_s: float = Field(
         20,
         gt=0,
@@ -156,7 +156,7 @@ class Settings(BaseSettings):
     )
     source_program: list[str] = Field(
         [sys.executable, "-P", "-m", "worker.programs.snapshot"],
-        description="Program that fetches frames, started by API and worker.",
+        description="Program of API and worker that fetches frames.",
     )
 
     # Poses in other formats.
@@ -166,21 +166,21 @@ class Settings(BaseSettings):
     )
     map_program: list[str] = Field(
         [sys.executable, "-P", "-m", "worker.programs.stmap"],
-        description="Program that computes ST maps, started by the API with their origin.",
+        description="Program of the API that computes ST maps.",
     )
     pose_program: list[str] = Field(
         [sys.executable, "-P", "-m", "worker.programs.clicked_pose"],
-        description="Program that finds a first pose while its points are being clicked, started by the API.",
+        description="Program of the API that finds a first pose while points are clicked.",
     )
 
     # Pictures and stitched views.
     picture_program: list[str] = Field(
         [sys.executable, "-P", "-m", "worker.programs.draw"],
-        description="Program that draws pictures when they are first requested, started by the API.",
+        description="Program of the API that draws pictures when they are first requested.",
     )
     stitch_program: list[str] = Field(
         [sys.executable, "-P", "-m", "worker.programs.stitch"],
-        description="Program that makes packages and previews of stitched views, started by the API.",
+        description="Program of the API that makes packages and previews of stitched views.",
     )
     pictures_at_once: int = Field(
         2,
@@ -214,8 +214,7 @@ class Settings(BaseSettings):
     job_timeout_s: float = Field(600, gt=0, description="Time limit of jobs without `timeout_s`.")
     job_program: list[str] = Field(
         [sys.executable, "-P", "-m", "worker.jobs.program"],
-        description="Program that computes one job: job and frames come on standard input, result and pictures go "
-        "to standard output.",
+        description="Program that computes one job, from standard input to standard output.",
     )
     takeover_after_s: float = Field(
         10, gt=2, description="Silence after which a worker counts as dead and another one takes its jobs over."
@@ -228,28 +227,24 @@ class Settings(BaseSettings):
     )
 
     # What is kept, counted from the end of a job.
-    keep_frames_days: float = Field(2, ge=0, description="Days that frames are kept after the end of their job.")
+    keep_frames_days: float = Field(2, ge=0, description="Days to keep frames, after the end of their job.")
     keep_pictures_days: float = Field(
         14,
         ge=0,
-        description="Days that pictures are kept after the end of their job; those of a venue's last accepted job "
-        "stay.",
+        description="Days to keep pictures, after the end of their job; those of a venue's last accepted job stay.",
     )
     keep_jobs_days: float = Field(
         400,
         ge=2,
-        description="Days that jobs and their idempotency keys are kept; the last accepted job of a venue stays.",
+        description="Days to keep jobs and their idempotency keys; the last accepted job of a venue stays.",
     )
     keep_revisions_years: float = Field(
         5,
         ge=1,
-        description="Years that poses of automatic calibrations are kept; poses that somebody set, accepted or "
-        "restored stay.",
+        description="Years to keep poses of automatic calibrations; those set, accepted or restored by hand stay.",
     )
-    keep_events_days: float = Field(
-        3, ge=2, description="Days that events of venues are kept for clients that reconnect."
-    )
-    keep_live_days: float = Field(7, ge=1, le=7, description="Days that the history of live poses by minute is kept.")
+    keep_events_days: float = Field(3, ge=2, description="Days to keep events of venues for clients that reconnect.")
+    keep_live_days: float = Field(7, ge=1, le=7, description="Days to keep the history of live poses by minute.")
     min_free_mb: float = Field(500, ge=0, description="Free disk space below which uploads are answered with 507.")
     tidy_every_s: float = Field(600, gt=0, description="Interval at which a worker deletes expired data.")
 
