@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: setup demo test test-fast test-long coverage format check wheel bench bench-find bench-knocked bench-confidence bench-plan bench-check bench-real bench-cost bench-fields bench-segmentation bench-truth bench-service bench-faults bench-hostile bench-rate bench-versions bench-video bench-follow bench-live bench-learned train lock clean
+.PHONY: setup demo test test-fast test-long generators coverage format check wheel bench bench-find bench-knocked bench-confidence bench-plan bench-check bench-real bench-cost bench-fields bench-segmentation bench-truth bench-service bench-faults bench-hostile bench-rate bench-versions bench-video bench-follow bench-live bench-learned train lock clean
 
 # What runs, without what tests, checks and clips need on top: a third of the size. Compiled where it is first imported.
 $(VENV)/.runtime: docker/requirements.lock requirements.lock pyproject.toml
@@ -38,8 +38,16 @@ test-fast: setup
 		tests/fields tests/service tests/worker tests/openapi tests/test_architecture.py
 
 # What CI runs after `make test`: proofs of accuracy, second parameters, a year of a venue; CONTRIBUTING.md says which.
-test-long: setup
+test-long: setup generators
 	$(PYTEST) -m long
+
+# Generators of clients, which `make test-long` tries the OpenAPI document with. They want an older typer than ESC.
+generators: $(VENV)/.generators
+
+$(VENV)/.generators: tests/openapi/generators.lock
+	$(PYTHON) -m venv $(VENV)/generators
+	$(VENV)/generators/bin/pip install --quiet --disable-pip-version-check --require-hashes -r $<
+	touch $@
 
 # Lines and branches that `make test` reaches, by rooms. By files, with the lines that nothing reaches: .venv/bin/coverage report
 coverage: setup
@@ -61,6 +69,7 @@ check: setup
 	$(BIN)/lint-imports
 	$(BIN)/deptry .
 	$(BIN)/python -m tests.openapi
+	$(BIN)/python -m tests.prose
 
 # What an earlier build left in build/lib would go into the wheel.
 wheel: setup
@@ -156,6 +165,7 @@ lock:
 	uv pip compile --universal --python-version 3.11 --generate-hashes --group dev -o requirements.lock pyproject.toml
 	uv pip compile --universal --python-version 3.11 --generate-hashes --extra exr --extra tracing --constraint requirements.lock \
 		-o docker/requirements.lock pyproject.toml
+	uv pip compile --universal --python-version 3.11 --generate-hashes --group generators -o tests/openapi/generators.lock
 
 clean:
 	rm -rf $(VENV) build dist *.egg-info client/build client/*.egg-info

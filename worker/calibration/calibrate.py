@@ -1,4 +1,4 @@
-"""The engine on one page: frames and stored poses in; new poses, verdicts and diagnostics out."""
+"""The engine on one page: frames and stored poses in, new poses and verdicts out."""
 
 from __future__ import annotations
 

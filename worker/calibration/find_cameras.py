@@ -1,4 +1,4 @@
-"""The engine's other page: frames without poses in; the cameras that took them out, each with a verdict."""
+"""The engine's other page: frames without poses in, cameras with verdicts out."""
 
 from __future__ import annotations
 
@@ -324,7 +324,7 @@ def why_not_confirmed(result: CameraResult, *, is_lens_found: bool) -> str | Non
     if is_lens_found and result.residual_px is not None and result.residual_px > most_px:
         return (
             f"lines are {result.residual_px:.2f} px from where pose and lens put them, at most {most_px:.2f} allowed "
-            "through a lens that was found with the pose; are the measures of the field quite right? Say what the "
+            "through a lens that was found with the pose; are the measures of the field right? Say what the "
             "lens is, if it is known"
         )
     return None

@@ -1,4 +1,4 @@
-"""The paint path: on a floor of several sports, the lines of one field are told from the others by their colour.
+"""The paint path: lines of several sports are told apart by their colour.
 
 Which paint is the field's is one unknown that all its lines and all cameras share. Where most of what looks like a
 line on the field is none of its lines, each colour on the floor is taken for the field's, and the cameras are placed by

@@ -1,4 +1,4 @@
-"""Frames that came from another camera of the venue than the one they were sent for: exchanged cables or addresses.
+"""Frames that came from another camera of the venue: exchanged cables or addresses.
 
 Asked only of cameras whose lines are not seen where their stored poses put them. Such a frame is another camera's
 if it passes the gate at that camera's stored pose with that camera's lens, as a frame of its own would.

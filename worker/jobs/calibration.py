@@ -176,6 +176,7 @@ def _result(
         )
 
     return Result(
+        kind="calibration",
         verdict=found.verdict,
         accepted=found.accepted,
         rejected_because=found.rejected_because,
