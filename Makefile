@@ -61,6 +61,8 @@ check: setup
 	$(BIN)/lint-imports
 	$(BIN)/deptry .
 	$(BIN)/python -m tests.openapi
+	$(BIN)/zizmor --offline --quiet --no-progress .github
+	if command -v actionlint >/dev/null; then actionlint; else echo "actionlint is not installed: of the workflows only safety was checked"; fi
 
 $(VENV)/.release: $(VENV)/.installed tools/requirements.lock
 	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r tools/requirements.lock

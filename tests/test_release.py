@@ -1,17 +1,21 @@
-"""What is released."""
+"""What is released, and what releases it."""
 
 import io
 import re
+import subprocess
+import sys
 import tarfile
 import zipfile
 from pathlib import Path
 
 import pytest
+import yaml
 
-from tools import release
+from tools import release, release_notes
 from tools.links import with_absolute_links
 
 ROOT = Path(__file__).parents[1]
+WORKFLOWS = {path.name: path.read_text() for path in (ROOT / ".github" / "workflows").glob("*.yml")}
 AT = "https://github.example/owner/esc/"
 
 
@@ -59,3 +63,45 @@ def test_every_link_of_a_page_on_pypi_leads_to_a_file_of_the_release(page):
     assert all(link.startswith("raw/v1/" if picture else "blob/v1/") for picture, link in ours)
     assert ours
     assert [link for _, link in ours if not (ROOT / link.split("/", 2)[2]).exists()] == []
+
+
+def test_a_tag_that_is_not_the_version_releases_nothing():
+    said = subprocess.run(
+        [sys.executable, "-m", "tools.release_notes", "v9.9.9", AT], cwd=ROOT, capture_output=True, text=True
+    )
+    assert (said.returncode, said.stdout) == (1, "")
+    assert "the tag is v9.9.9, but version in pyproject.toml is" in said.stderr
+
+
+def test_the_notes_of_a_release_are_its_part_of_the_changelog():
+    changelog = "# Changelog\n\n## Unreleased\n\n- c\n\n## 0.2.0 (2026-11-23)\n\n- b\n\n## 0.1.0 (2026-11-22)\n\n- a\n"
+    assert release_notes.notes(changelog, "0.2.0") == "- b"
+    assert release_notes.notes(changelog, "0.1.0") == "- a"
+    with pytest.raises(SystemExit, match=r"no heading `## 0.3.0 \(date\)`"):
+        release_notes.notes(changelog, "0.3.0")
+
+
+@pytest.mark.parametrize("name", WORKFLOWS)
+def test_workflows_run_actions_by_commit_and_nothing_of_strangers_with_rights(name):
+    text, workflow = WORKFLOWS[name], yaml.safe_load(WORKFLOWS[name])
+    assert all(re.fullmatch(r"\S+@[0-9a-f]{40} # v[\d.]+", used) for used in re.findall(r"uses: (.+)", text))
+    assert "pull_request_target" not in text
+    assert workflow["permissions"] == {}
+    checkouts = [
+        step for job in workflow["jobs"].values() for step in job["steps"] if "checkout@" in str(step.get("uses"))
+    ]
+    assert all(step["with"]["persist-credentials"] is False for step in checkouts)
+
+
+def test_workflows_are_safe_as_zizmor_judges():
+    command = [Path(sys.executable).parent / "zizmor", "--offline", "--quiet", "--no-progress", ROOT / ".github"]
+    judged = subprocess.run(command, capture_output=True, text=True)
+    assert judged.returncode == 0, judged.stdout
+
+
+def test_the_parts_of_ci_are_all_tests():
+    matrix = yaml.safe_load(WORKFLOWS["ci.yml"])["jobs"]["test"]["strategy"]["matrix"]
+    assert [part["part"] for part in matrix["include"]] == matrix["part"]
+    found = [path for part in matrix["include"] for pattern in part["tests"].split() for path in ROOT.glob(pattern)]
+    tests = set((ROOT / "tests").rglob("test_*.py"))
+    assert {path for path in tests if not any(path.is_relative_to(part) for part in found)} == set()
