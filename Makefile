@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: setup demo test test-fast test-long coverage format check wheel release-dry-run bench bench-find bench-knocked bench-confidence bench-plan bench-check bench-real bench-cost bench-fields bench-segmentation bench-truth bench-service bench-faults bench-hostile bench-rate bench-versions bench-video bench-follow bench-live bench-learned train lock clean
+.PHONY: setup demo test test-fast test-long coverage format check wheel release-dry-run docs bench bench-find bench-knocked bench-confidence bench-plan bench-check bench-real bench-cost bench-fields bench-segmentation bench-truth bench-service bench-faults bench-hostile bench-rate bench-versions bench-video bench-follow bench-live bench-learned train lock clean
 
 # What runs, without what tests, checks and clips need on top: a third of the size. Compiled where it is first imported.
 $(VENV)/.runtime: docker/requirements.lock requirements.lock pyproject.toml
@@ -67,6 +67,10 @@ check: setup
 $(VENV)/.release: $(VENV)/.installed tools/requirements.lock
 	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r tools/requirements.lock
 	touch $@
+
+# The site of the documents into build/site, with every link and anchor checked.
+docs: $(VENV)/.release
+	$(BIN)/python -m tools.site build/site
 
 # What an earlier build left in build/lib would go into the wheel.
 wheel: setup

@@ -105,3 +105,18 @@ def test_the_parts_of_ci_are_all_tests():
     found = [path for part in matrix["include"] for pattern in part["tests"].split() for path in ROOT.glob(pattern)]
     tests = set((ROOT / "tests").rglob("test_*.py"))
     assert {path for path in tests if not any(path.is_relative_to(part) for part in found)} == set()
+
+
+@pytest.mark.long
+def test_the_site_is_built_from_the_index_with_every_link_and_anchor_right(tmp_path):
+    for package in ("zensical", "latex2mathml"):
+        pytest.importorskip(package, reason="`make docs` installs it")
+    subprocess.run([sys.executable, "-m", "tools.site", tmp_path / "site"], cwd=ROOT, check=True)
+    model = (tmp_path / "site" / "docs" / "model" / "index.html").read_text()
+    assert 'display="block"' in model
+    assert not re.search(r"\$[^<]*\\[a-z]+", model)
+    assert (tmp_path / "site" / "api" / "openapi.json").stat().st_size > 100_000
+    summary = (tmp_path / "site" / "llms.txt").read_text()
+    assert "docs/drift.md): what the service learns" in summary
+    listed = re.findall(r"\]\((\S+)\)", summary)
+    assert [page for page in listed if not (tmp_path / "site" / page.split("/esc/")[1]).is_file()] == []
