@@ -121,7 +121,7 @@ def refine(
     """
     if stitch_weight == 0 and len(cameras) > 1 and not free:
         return _each_alone(pitch, cameras, observations, stored or cameras, memories)
-    unknowns = Unknowns(len(cameras), free, Ground.under(pitch.line_points()))
+    unknowns = Unknowns(len(cameras), free, Ground.under(pitch.measured_points))
     begun = Estimate.initial(pitch, cameras, unknowns)
     remembered = memories_of_field(memories or [None] * len(cameras), begun.lines)
     refiner = _Refiner(reader or observations.reader(), unknowns, _repainted_in_memory(remembered), cameras)
@@ -280,7 +280,7 @@ def evaluate_poses(
     memories: Sequence[CameraMemory | None] | None = None,
 ) -> RefinedPoses:
     """Evaluate poses that are left as they are, with everything else; arguments as for `refine`."""
-    unknowns = Unknowns(len(cameras), free, Ground.under(pitch.line_points()))
+    unknowns = Unknowns(len(cameras), free, Ground.under(pitch.measured_points))
     estimate = Estimate.initial(pitch, cameras, unknowns)
     remembered = memories_of_field(memories or [None] * len(cameras), estimate.lines)
     refiner = _Refiner(observations.reader(), unknowns, _repainted_in_memory(remembered), cameras)
@@ -309,7 +309,7 @@ def _assessed(
 ) -> RefinedPoses:
     refiner = refiner.around(estimate)
     lines, reader = estimate.on_ground(refiner.unknowns), refiner.reader
-    evidence = reader.evidence(estimate.pitch, lines, estimate.cameras)
+    evidence = reader.evidence(estimate.pitch, lines[~lines.end_to_end], estimate.cameras)
     everything = _of_seen(reader.measure(lines, estimate.cameras, EVALUATION_SEARCH_PX), evidence)
     measured = with_misfit_noise(estimate, refiner.without_repainted(everything))
     # A field that is wrong looks like a ground that swells a lot: judged, it has to be an ordinary ground.
