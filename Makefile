@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: setup demo test test-fast test-long coverage format check wheel bench bench-find bench-knocked bench-confidence bench-plan bench-check bench-real bench-cost bench-fields bench-segmentation bench-truth bench-service bench-faults bench-hostile bench-rate bench-versions bench-video bench-follow bench-live bench-learned train lock clean
+.PHONY: setup demo test test-fast test-long generators coverage format check wheel release-dry-run docs bench bench-find bench-knocked bench-confidence bench-plan bench-check bench-real bench-cost bench-fields bench-segmentation bench-truth bench-service bench-faults bench-hostile bench-rate bench-versions bench-video bench-follow bench-live bench-learned train lock clean
 
 # What runs, without what tests, checks and clips need on top: a third of the size. Compiled where it is first imported.
 $(VENV)/.runtime: docker/requirements.lock requirements.lock pyproject.toml
@@ -28,9 +28,9 @@ $(VENV)/.installed: $(VENV)/.runtime
 # Compiled files are kept even where the machine says not to: each of hundreds of processes would compile them anew.
 PYTEST := PYTHONDONTWRITEBYTECODE= $(BIN)/pytest --numprocesses=auto --dist=worksteal
 
-# Every behaviour once; its accuracy and other parameters are left to `make test-long`.
+# Every behaviour once; its accuracy and other parameters are left to `make test-long`. TESTS: some folders or files, default all.
 test: setup
-	$(PYTEST) -m "not long"
+	$(PYTEST) -m "not long" $(TESTS)
 
 # For the loop of a day. Not in it: the whole service, its pages, older releases, servers, whole calibrations, the network.
 test-fast: setup
@@ -38,8 +38,16 @@ test-fast: setup
 		tests/fields tests/service tests/worker tests/openapi tests/test_architecture.py
 
 # What CI runs after `make test`: proofs of accuracy, second parameters, a year of a venue; CONTRIBUTING.md says which.
-test-long: setup
-	$(PYTEST) -m long
+test-long: setup generators
+	$(PYTEST) -m long $(TESTS)
+
+# Generators of clients, which `make test-long` tries the OpenAPI document with. They want an older typer than ESC.
+generators: $(VENV)/.generators
+
+$(VENV)/.generators: tests/openapi/generators.lock
+	$(PYTHON) -m venv $(VENV)/generators
+	$(VENV)/generators/bin/pip install --quiet --disable-pip-version-check --require-hashes -r $<
+	touch $@
 
 # Lines and branches that `make test` reaches, by rooms. By files, with the lines that nothing reaches: .venv/bin/coverage report
 coverage: setup
@@ -61,11 +69,26 @@ check: setup
 	$(BIN)/lint-imports
 	$(BIN)/deptry .
 	$(BIN)/python -m tests.openapi
+	$(BIN)/python -m tests.prose
+	$(BIN)/zizmor --offline --quiet --no-progress .github
+	if command -v actionlint >/dev/null; then actionlint; else echo "actionlint is not installed: of the workflows only safety was checked"; fi
+
+$(VENV)/.release: $(VENV)/.installed tools/requirements.lock
+	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r tools/requirements.lock
+	touch $@
+
+# The site of the documents into build/site, with every link and anchor checked.
+docs: $(VENV)/.release
+	$(BIN)/python -m tools.site build/site
 
 # What an earlier build left in build/lib would go into the wheel.
 wheel: setup
 	rm -rf build/lib build/bdist.*
 	$(BIN)/pip wheel --quiet --disable-pip-version-check --no-deps --no-build-isolation --wheel-dir dist . ./client
+
+# All that can be tried of a release without publishing it; the files are in dist. Needs what is committed, not what is edited.
+release-dry-run: $(VENV)/.release
+	$(BIN)/python -m tools.release dist
 
 # One BLAS thread, as the worker sets it.
 BENCH := env OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks
@@ -156,6 +179,9 @@ lock:
 	uv pip compile --universal --python-version 3.11 --generate-hashes --group dev -o requirements.lock pyproject.toml
 	uv pip compile --universal --python-version 3.11 --generate-hashes --extra exr --extra tracing --constraint requirements.lock \
 		-o docker/requirements.lock pyproject.toml
+	uv pip compile --universal --python-version 3.11 --generate-hashes --group generators -o tests/openapi/generators.lock
+	uv pip compile --universal --python-version 3.11 --generate-hashes --group release --constraint requirements.lock \
+		-o tools/requirements.lock
 
 clean:
 	rm -rf $(VENV) build dist *.egg-info client/build client/*.egg-info

@@ -3,10 +3,12 @@
 There is one source. `esc_client/__init__.py` says what the package offers and is, like every module here, written
 against the packages `service` and `fields`. The build copies each module that it imports, directly or not, and renames
 the package in each import: `service.client` is `esc_client.client`, `fields.shapes` is `esc_client.fields.shapes`.
+A source distribution has the copies, so that it needs neither a clone nor this file.
 The tests import every module of the wheel where nothing else of ESC is installed.
 """
 
 import ast
+import json
 import re
 import shutil
 import tomllib
@@ -16,6 +18,7 @@ from typing import Any
 from setuptools import setup
 from setuptools.command.build_py import build_py
 from setuptools.command.editable_wheel import editable_wheel
+from setuptools.command.sdist import sdist
 
 PACKAGE = "esc_client"
 HERE = Path(__file__).resolve().parent
@@ -33,13 +36,24 @@ class BuildFromSources(build_py):
         """Build."""
         # Files of an earlier build would go into the wheel.
         shutil.rmtree(Path(self.build_lib) / PACKAGE, ignore_errors=True)
-        for source in [*reached_modules(HERE / PACKAGE / "__init__.py"), *(SOURCES / "fields").glob("*.toml")]:
-            folder = source.parent.relative_to(SOURCES).as_posix()
-            before = next(name for name in RENAMED if folder.startswith(name))
-            target = Path(self.build_lib) / folder.replace(before, RENAMED[before], 1) / source.name
-            target.parent.mkdir(parents=True, exist_ok=True)
-            target.write_bytes(OUR_IMPORT.sub(renamed_import, source.read_bytes()))
-        (Path(self.build_lib) / PACKAGE / "py.typed").touch()
+        copy_modules(Path(self.build_lib))
+
+
+class SourcesWithoutClone(sdist):
+    """Put the copied modules into the source distribution, and a pyproject.toml that says all by itself."""
+
+    def make_release_tree(self, base_dir: str, files: list[str]) -> None:
+        """Fill the folder that is packed."""
+        super().make_release_tree(base_dir, files)
+        tree = Path(base_dir)
+        copy_modules(tree)
+        (tree / "setup.py").unlink()
+        metadata = project_metadata()
+        values = {"version": metadata["version"], "dependencies": metadata["install_requires"]}
+        static = "".join(f"{name} = {json.dumps(value)}\n" for name, value in values.items())
+        static += "".join(f"urls.{name} = {json.dumps(url)}\n" for name, url in metadata["project_urls"].items())
+        project = tree / "pyproject.toml"
+        project.write_text(re.sub(r"^dynamic = .*\n", lambda _: static, project.read_text(), flags=re.MULTILINE))
 
 
 class NoEditableInstallation(editable_wheel):
@@ -48,6 +62,17 @@ class NoEditableInstallation(editable_wheel):
     def run(self) -> None:
         """Raise an error."""
         raise SystemExit(f"{PACKAGE} has no sources of its own, so it cannot be editable; edit service/client.py")
+
+
+def copy_modules(target: Path) -> None:
+    """Write the package into the folder `target`, with its imports renamed."""
+    for source in [*reached_modules(HERE / PACKAGE / "__init__.py"), *(SOURCES / "fields").glob("*.toml")]:
+        folder = source.parent.relative_to(SOURCES).as_posix()
+        before = next(name for name in RENAMED if folder.startswith(name))
+        copy = target / folder.replace(before, RENAMED[before], 1) / source.name
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        copy.write_bytes(OUR_IMPORT.sub(renamed_import, source.read_bytes()))
+    (target / PACKAGE / "py.typed").touch()
 
 
 def reached_modules(root: Path) -> set[Path]:
@@ -80,13 +105,15 @@ def renamed_import(match: re.Match[bytes]) -> bytes:
 
 
 def project_metadata() -> dict[str, Any]:
-    """Return the version of the service, and its demands on the packages that its client needs as well."""
+    """Return version and addresses of the service, and its demands on the packages that its client needs as well."""
     project = SOURCES / "pyproject.toml"
     if not project.is_file():
         raise SystemExit(f"{PACKAGE} is built inside a source of ESC: `make wheel` there")
     service = tomllib.loads(project.read_text())["project"]
     demands = {re.split(r"[^\w-]", demand, maxsplit=1)[0]: demand for demand in service["dependencies"]}
-    return {"version": service["version"], "install_requires": [demands[name] for name in DEPENDENCIES]}
+    needed = [demands[name] for name in DEPENDENCIES]
+    return {"version": service["version"], "install_requires": needed, "project_urls": service["urls"]}
 
 
-setup(cmdclass={"build_py": BuildFromSources, "editable_wheel": NoEditableInstallation}, **project_metadata())
+COMMANDS = {"build_py": BuildFromSources, "editable_wheel": NoEditableInstallation, "sdist": SourcesWithoutClone}
+setup(cmdclass=COMMANDS, **project_metadata())

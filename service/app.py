@@ -23,8 +23,9 @@ from service.api.root_path import RootPath
 from service.pages import FOR_BROWSERS, show_browsers_what_is_missing
 from service.pages import ROUTERS as PAGES
 from service.routes import docs, event_streams, health, jobs, live, pictures, snapshot, stitch, venues
-from service.routes.contract import documented
+from service.routes.contract import document
 from service.routes.contract.introduction import DESCRIPTION, TAGS
+from service.routes.contract.problem_docs import OF_ANY_ROUTE
 from service.routes.submissions import find, frames, intrinsics, locate, resubmit
 from service.schemas.problems import Problem
 from service.settings import Settings
@@ -38,12 +39,14 @@ log = structlog.get_logger()
 def create_app(settings: Settings) -> FastAPI:
     """Return the application, after the schema of the database was brought up to date."""
     context = Context(settings)
-    app = documented.DocumentedApp(
+    app = document.DocumentedApp(
         title="ESC",
         summary="Keeps fixed multi-camera installations on sports fields calibrated.",
         description=DESCRIPTION,
         openapi_tags=TAGS,
-        servers=[{"url": settings.root_path}] if settings.root_path else None,
+        servers=[{"url": settings.root_path or "/"}],
+        contact={"name": "The ESC maintainers"},
+        license_info={"name": "Apache License 2.0", "identifier": "Apache-2.0"},
         version=version("esc-calibration"),
         lifespan=_lifespan,
         # FastAPI's own pages load their scripts from the internet.
@@ -57,9 +60,7 @@ def create_app(settings: Settings) -> FastAPI:
     app.add_middleware(RequestLog, metrics=context.metrics)
     app.add_middleware(HttpDefaults)
     app.add_middleware(RootPath, root_path=settings.root_path)
-    documented.document_callback(app)
-    documented.document_alarms(app)
-    documented.document_events(app)
+    document.document_webhooks(app)
     problems.install_handlers(app)
     show_browsers_what_is_missing(app)
     _answer_outages(app)
@@ -71,9 +72,7 @@ def create_app(settings: Settings) -> FastAPI:
 def routes_of_all() -> Sequence[BaseRoute]:
     """Return all routes, put together once for all applications of a process: a tenth of a second of work."""
     # Generated clients call their functions by the id.
-    router = APIRouter(
-        responses=documented.problem_responses(422, 503), generate_unique_id_function=lambda route: route.name
-    )
+    router = APIRouter(responses=OF_ANY_ROUTE, generate_unique_id_function=lambda route: route.name)
     router.include_router(FOR_BROWSERS)
     for routes in (
         venues,

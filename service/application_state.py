@@ -1,4 +1,4 @@
-"""State of a service: its database, blob store and queue, and the intake of frames."""
+"""State of a service: database, blob store, queue, intake of frames."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Blocking methods made of the coroutines of a class whose connection never waits.
+"""Blocking methods made of the coroutines of a class.
 
 class Client:
     calls: BlockingCalls  # an AsyncClient whose coroutines never wait, and so end at their first step

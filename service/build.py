@@ -1,4 +1,4 @@
-"""Version and commit of this program, and commands that install its optional parts."""
+"""Version and commit of this program, and commands that install its extras."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Child processes: they end with their parent, and those that decode uploads get no secrets."""
+"""Child processes, which end with their parent; those that decode uploads get no secrets."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A typed client of the HTTP interface, blocking (`Client`, which `esc` speaks with) and not (`AsyncClient`).
+"""A typed client of the HTTP interface, blocking (`Client`) and not (`AsyncClient`).
 
     with Client("http://127.0.0.1:8000", api_key) as client:
         job = client.follow(client.calibrate("demo", {"left": [path]}, {}), print)

@@ -1,4 +1,4 @@
-"""Errors of the client: refusals, answers that cannot be read, and when to ask again."""
+"""Errors of the client, and when to ask again."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Isolation of processes of the same user: services hide their memory, decoders cannot read that of others.
+"""Isolation of processes of the same user from each other's memory.
 
 The programs that decode what strangers sent run as the user of the API and the worker. Linux lets a process read the
 environment and the memory of another one of its user, and there are the secrets. Each half closes that by itself.

@@ -1,4 +1,4 @@
-"""Control charts of a series that is measured once a night, which detect a shift of its mean.
+"""Control charts that detect a shift of a nightly series.
 
 Two charts of the standardised values, both two-sided, as in Montgomery, *Introduction to Statistical Quality Control*:
 the exponentially weighted moving average (EWMA), which shows where the mean is now, and the tabular cumulative sum

@@ -1,4 +1,4 @@
-"""Number of cores that this process may use, by affinity and by the quotas of its control groups.
+"""Number of cores by affinity and control groups.
 
 A container that may use two of 64 cores and starts 64 threads has each of them throttled most of the time.
 """

@@ -1,4 +1,7 @@
-"""Secrets in files, as Docker and Kubernetes mount them: `NAME_FILE` names the file of the secret `NAME`."""
+"""Secrets in files, as Docker and Kubernetes mount them (`NAME_FILE`).
+
+`NAME_FILE` names the file of the secret `NAME`.
+"""
 
 from __future__ import annotations
 

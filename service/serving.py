@@ -1,4 +1,4 @@
-"""API server in this process, and for `esc up` a worker process beside it that is kept alive."""
+"""API server of this process, and the worker process of `esc up`."""
 
 from __future__ import annotations
 

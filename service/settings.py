@@ -1,4 +1,4 @@
-"""Every setting of the service and its worker: environment variables `ESC_...`, or a `.env` file."""
+"""Every setting: environment variables `ESC_...`, or a `.env` file."""
 
 from __future__ import annotations
 
@@ -50,13 +50,12 @@ class Settings(BaseSettings):
     data: Path = Field(Path("esc-data"), description="Folder of the database, the frames and the pictures.")
     database_url: str | None = Field(
         None,
-        description="Database: `postgresql://user:password@host:5432/name` or `sqlite:////folder/file`. Absent: SQLite "
-        "in the data folder. `ESC_DATABASE_URL_FILE` may name a file that holds it.",
+        description="Database: `postgresql://user:password@host:5432/name` or `sqlite:////folder/file`. Absent: "
+        "SQLite in the data folder. `ESC_DATABASE_URL_FILE` may name its file.",
     )
     sqlite_on_network: bool = Field(
         default=False,
-        description="`true`: allow SQLite on a network file system (NFS, SMB), only if API and worker run on one "
-        "machine.",
+        description="`true`: allow SQLite on a network file system, only if API and worker run on one machine.",
     )
     blob_url: str | None = Field(
         None,
@@ -72,18 +71,17 @@ class Settings(BaseSettings):
     port: int = Field(8000, ge=0, le=65535, description="Port to listen on; 0 takes a free one and prints it.")
     root_path: str = Field(
         "",
-        description="Path below which a proxy serves the service: `/esc` for https://truck.example.com/esc/. Pages, "
-        "redirects, the cookie and `/openapi.json` include it; the proxy may strip it from requests or not.",
+        description="Path below which a proxy serves the service: `/esc` for https://truck.example.com/esc/. The "
+        "proxy may strip it from requests or not.",
     )
     auth: Literal["auto", "off"] = Field(
         "auto",
-        description="`auto`: callers need an API key as soon as one exists, and always if `ESC_HOST` is open to other "
-        "machines. `off`: anyone may call, from anywhere.",
+        description="`auto`: callers need an API key as soon as one exists, and always if `ESC_HOST` is open to "
+        "other machines. `off`: anyone may call.",
     )
     allowed_hosts: list[str] = Field(
         [],
-        description="Host names by which a service without keys may be called, besides IP addresses and "
-        '`localhost`: `["esc.truck.lan"]`.',
+        description='Host names of a service without keys, besides IP addresses and `localhost`: `["esc.truck.lan"]`.',
     )
     session_hours: float = Field(12, gt=0, description="Hours after which a browser has to sign in again.")
     rate_per_s: float = Field(
@@ -96,29 +94,29 @@ class Settings(BaseSettings):
     uploads_at_once: int = Field(
         16,
         ge=1,
-        description="Uploads that one API process takes at the same time. Further ones are answered with 503; one for "
-        "which `TMPDIR` (`/tmp`) has no room while it arrives, with 507.",
+        description="Uploads at the same time of one API process. Further ones are answered with 503; one for "
+        "which `TMPDIR` (`/tmp`) has no room, with 507.",
     )
     uploads_mb: float = Field(
         1000,
         gt=0,
-        description="Total size of those uploads. One beyond it is answered with 503 before it is read, unless it is "
-        "the only one. At most 150 MB of them are in memory.",
+        description="Total size of those uploads. One beyond it is answered with 503, unless it is the only one. "
+        "At most 150 MB of them are in memory.",
     )
     connections: int = Field(
         4000,
         ge=1,
-        description="Clients that may be connected to one API process. Beyond it, the longest idle ones "
-        "are disconnected. Each is an open file: if the limit of open files (`LimitNOFILE`, `ulimits`, `ulimit -Hn`) "
-        "is lower, fewer clients are admitted, and the log says so at the start.",
+        description="Clients connected to one API process; beyond it, the longest idle ones are disconnected. A "
+        "lower limit of open files (`LimitNOFILE`, `ulimits`, `ulimit -Hn`) admits fewer, as the log "
+        "says at the start.",
     )
     followers: int = Field(
-        1000, ge=1, description="Clients that may follow venues at one API process; more are answered with 503."
+        1000, ge=1, description="Clients that follow venues at one API process; more are answered with 503."
     )
     waiters: int = Field(
         1000,
         ge=1,
-        description="Clients that may wait for jobs (`?wait=`, `/jobs/{id}/events`) at one API process; more are "
+        description="Clients that wait for jobs (`?wait=`, `/jobs/{id}/events`) at one API process; more are "
         "answered with 503.",
     )
     max_frame_mb: float = Field(48, gt=0, description="Largest size of one frame or photo.")
@@ -126,20 +124,20 @@ class Settings(BaseSettings):
     max_job_pixels: int = Field(
         500_000_000,
         gt=0,
-        description="Pixels of all frames of one job, which are kept decoded; 500 million are 60 frames of 4K.",
+        description="Pixels of all frames of one job; 500 million are 60 frames of 4K.",
     )
     job_memory_mb: float = Field(
         6000,
         gt=0,
-        description="Memory limit of one program that decodes frames, on Linux and unless `ESC_PROVIDER` is `cuda`: a "
-        "job that needs more fails with a message, without harm to others. `ESC_MAX_JOB_PIXELS` needs 4500.",
+        description="Memory limit of one program that decodes frames, on Linux and unless `ESC_PROVIDER` is "
+        "`cuda`; a job that needs more fails. `ESC_MAX_JOB_PIXELS` needs 4500.",
     )
-    max_frames_per_camera: int = Field(16, ge=1, description="Frames of one camera in one job, which are fused.")
+    max_frames_per_camera: int = Field(16, ge=1, description="Frames of one camera in one job.")
     stall_timeout_s: float = Field(
         20,
         gt=0,
-        description="Disconnect clients that should send or receive bytes and make no progress for this long, or whose "
-        "request head is incomplete by then.",
+        description="Disconnect clients that make no progress for this long, or whose request head is incomplete "
+        "by then.",
     )
     request_timeout_s: float = Field(
         600, gt=0, description="Time limit for receiving a body, and for sending an answer."
@@ -158,7 +156,7 @@ class Settings(BaseSettings):
     )
     source_program: list[str] = Field(
         [sys.executable, "-P", "-m", "worker.programs.snapshot"],
-        description="Program that fetches frames, started by API and worker.",
+        description="Program of API and worker that fetches frames.",
     )
 
     # Poses in other formats.
@@ -168,28 +166,27 @@ class Settings(BaseSettings):
     )
     map_program: list[str] = Field(
         [sys.executable, "-P", "-m", "worker.programs.stmap"],
-        description="Program that computes ST maps, started by the API with their origin.",
+        description="Program of the API that computes ST maps.",
     )
     pose_program: list[str] = Field(
         [sys.executable, "-P", "-m", "worker.programs.clicked_pose"],
-        description="Program that finds a first pose while its points are being clicked, started by the API.",
+        description="Program of the API that finds a first pose while points are clicked.",
     )
 
     # Pictures and stitched views.
     picture_program: list[str] = Field(
         [sys.executable, "-P", "-m", "worker.programs.draw"],
-        description="Program that draws pictures when they are first requested, started by the API.",
+        description="Program of the API that draws pictures when they are first requested.",
     )
     stitch_program: list[str] = Field(
         [sys.executable, "-P", "-m", "worker.programs.stitch"],
-        description="Program that makes packages and previews of stitched views, started by the API, one of each at a "
-        "time.",
+        description="Program of the API that makes packages and previews of stitched views.",
     )
     pictures_at_once: int = Field(
         2,
         ge=1,
-        description="Pictures that one API process draws at the same time. Further requests wait, and are answered "
-        "with 503 after 20 s.",
+        description="Pictures that one API process draws at the same time. Others wait, and are answered with 503 "
+        "after 20 s.",
     )
 
     # The worker.
@@ -201,7 +198,7 @@ class Settings(BaseSettings):
     jobs_at_once: int = Field(
         1,
         ge=1,
-        description="Jobs that one worker computes at the same time, beside a search for cameras and a first pose.",
+        description="Jobs that one worker computes at the same time, besides a search and a first pose.",
     )
     provider: Literal["cpu", "cuda", "openvino"] = Field(
         "cpu",
@@ -211,14 +208,13 @@ class Settings(BaseSettings):
     threads: int = Field(
         default_factory=cores.usable_cores,
         ge=1,
-        description="Threads of a job, for inference and pictures. The default respects CPU affinity (`taskset`) and "
-        "the CPU quota of the container or unit. Results do not depend on it.",
+        description="Threads of a job, for inference and pictures. The default respects CPU affinity (`taskset`) "
+        "and the CPU quota of the container or unit. Results do not depend on it.",
     )
     job_timeout_s: float = Field(600, gt=0, description="Time limit of jobs without `timeout_s`.")
     job_program: list[str] = Field(
         [sys.executable, "-P", "-m", "worker.jobs.program"],
-        description="Program that computes one job: it reads the job and its frames on standard input, writes result "
-        "and pictures to standard output, and sees no setting, no secret and no store.",
+        description="Program that computes one job, from standard input to standard output.",
     )
     takeover_after_s: float = Field(
         10, gt=2, description="Silence after which a worker counts as dead and another one takes its jobs over."
@@ -226,42 +222,38 @@ class Settings(BaseSettings):
     drain_s: float = Field(
         25,
         ge=0,
-        description="Time that running jobs have to end when their worker is stopped; then they return to the queue. "
-        "Keep `TimeoutStopSec` and `stop_grace_period` longer.",
+        description="Time that running jobs have to end when their worker is stopped; then they return to the "
+        "queue. Keep `TimeoutStopSec` and `stop_grace_period` longer.",
     )
 
     # What is kept, counted from the end of a job.
-    keep_frames_days: float = Field(2, ge=0, description="Days that frames are kept after the end of their job.")
+    keep_frames_days: float = Field(2, ge=0, description="Days to keep frames, after the end of their job.")
     keep_pictures_days: float = Field(
         14,
         ge=0,
-        description="Days that pictures are kept after the end of their job; those of a venue's last accepted job "
-        "stay.",
+        description="Days to keep pictures, after the end of their job; those of a venue's last accepted job stay.",
     )
     keep_jobs_days: float = Field(
         400,
         ge=2,
-        description="Days that jobs and their idempotency keys are kept; the last accepted job of a venue stays.",
+        description="Days to keep jobs and their idempotency keys; the last accepted job of a venue stays.",
     )
     keep_revisions_years: float = Field(
         5,
         ge=1,
-        description="Years that poses of automatic calibrations are kept; poses that somebody set, accepted or "
-        "restored stay.",
+        description="Years to keep poses of automatic calibrations; those set, accepted or restored by hand stay.",
     )
-    keep_events_days: float = Field(
-        3, ge=2, description="Days that events of venues are kept for clients that reconnect."
-    )
-    keep_live_days: float = Field(7, ge=1, le=7, description="Days that the history of live poses by minute is kept.")
+    keep_events_days: float = Field(3, ge=2, description="Days to keep events of venues for clients that reconnect.")
+    keep_live_days: float = Field(7, ge=1, le=7, description="Days to keep the history of live poses by minute.")
     min_free_mb: float = Field(500, ge=0, description="Free disk space below which uploads are answered with 507.")
     tidy_every_s: float = Field(600, gt=0, description="Interval at which a worker deletes expired data.")
 
     # Callbacks.
     webhook_secret: SecretStr | None = Field(
         None,
-        description="Key that signs callbacks, without which `callback_url` is refused: `whsec_` and 24 to 64 bytes in "
-        "base64; two keys, separated by a space, during a change of keys. `ESC_WEBHOOK_SECRET_FILE` may name a file "
-        "that holds it.",
+        description="Key that signs callbacks, without which `callback_url` is refused: `whsec_` and 24 to 64 "
+        "bytes in base64; two keys, separated by a space, during a change. `ESC_WEBHOOK_SECRET_FILE` "
+        "may name its file.",
     )
     callback_expires_days: float = Field(
         2,
@@ -274,8 +266,8 @@ class Settings(BaseSettings):
     )
     callbacks: list[str] = Field(
         [],
-        description="Hosts that callbacks may go to although they are not on the public internet, for API and workers: "
-        'names with wildcards, and networks: `["mixer.truck.lan", "10.2.0.0/24"]`.',
+        description="Hosts that callbacks may go to although they are private, for API and workers: names with "
+        'wildcards, and networks: `["mixer.truck.lan", "10.2.0.0/24"]`.',
     )
 
     # Logs and metrics.

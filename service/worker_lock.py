@@ -1,4 +1,4 @@
-"""Lock by which only one worker of a name runs on a folder, and the identity of such a lock."""
+"""Lock by which only one worker of a name runs on a folder."""
 
 from __future__ import annotations
 

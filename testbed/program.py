@@ -111,6 +111,7 @@ def answer(task: dict, with_frames: list[str]) -> dict:
     good = {"reject": 0, "swapped": 0, "partly": 1, "knock": 1}.get(behaviour, len(cameras))
     everyone = good == len(cameras)
     common = {
+        "kind": task["kind"],
         "accepted": everyone,
         "rejected_because": None if everyone else "the lines do not fit",
         "cameras": [
@@ -166,6 +167,7 @@ def found_cameras(sought: list[str], behaviour: str, task: dict) -> dict:
     away_m = [40.0 + 20 * number for number in range(13 if behaviour == "hopeless" else 2)]
     why = "two poses explain the frame alike"
     return {
+        "kind": "find",
         "accepted": good == len(sought),
         "rejected_because": None if good == len(sought) else "; ".join(f"camera {one}: {why}" for one in sought[good:]),
         "cameras": [

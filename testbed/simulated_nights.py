@@ -46,7 +46,7 @@ class Painted:
     @classmethod
     def drawn(cls, pitch: Field, rng: np.random.Generator) -> Painted:
         """On a ground that swells, by a painter who is half a centimetre off."""
-        lines = pitch.line_points()
+        lines = pitch.measured_points
         ground = Ground.under(lines)
         swell = (
             SWELL * lines.uneven_m * np.linalg.cholesky(np.linalg.inv(ground.precision)) @ rng.normal(size=len(ground))
@@ -64,7 +64,7 @@ class Painted:
     def painted_anew(self, name: str, aside_m: float) -> Painted:
         """Return the field with one marking so far aside."""
         number = [marking.name for marking in self.pitch.markings()].index(name)
-        its = self.lines.marking == number
+        its = (self.lines.marking == number) & ~self.lines.end_to_end
         return replace(self, there=self.there + its[:, None] * aside_m * self.lines.normal)
 
 
@@ -137,7 +137,7 @@ class Installation:
         for number, result in enumerate(results):
             if not result.accepted:
                 continue
-            lines = self.pitch.line_points()
+            lines = self.pitch.measured_points
             frames = str(sight.noise[number].sum())
             job = AcceptedJob(
                 result.camera,

@@ -37,9 +37,9 @@ def layers(place: str) -> list[list[str]]:
 
 
 def _table(place: str) -> str:
-    lines = ["| row | room | what it is |", "|---|---|---|"]
+    lines = ["| row, room | what it is |", "|---|---|"]
     for number, row in enumerate(layers(place), 1):
-        lines += [f"| {number} | `{room}` | {purpose(f'{place}.{room}')} |" for room in row]
+        lines += [f"| {number} `{room}` | {purpose(f'{place}.{room}')} |" for room in row]
     return "\n".join(lines)
 
 

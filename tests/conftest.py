@@ -57,6 +57,7 @@ PARTS = {
     "gstreamer": "install GStreamer's RTSP server (Debian: apt-get install python3-gi gir1.2-gst-rtsp-server-1.0 "
     "gstreamer1.0-plugins-good gstreamer1.0-plugins-bad)",
     "ffmpeg": "install FFmpeg (Debian: apt-get install ffmpeg)",
+    "generators": "install generators of clients (make generators)",
 }
 
 

@@ -42,7 +42,7 @@ def tables() -> str:
 
 
 def _type(field: FieldInfo) -> str:
-    """Return the type of a setting with its bounds: `number > 0`, `json or console`, `JSON list of texts`."""
+    """Return the type of a setting with its bounds: `number > 0`, `json or console`, `JSON list`."""
     bounds = [f"{sign} {value}" for sign, value in _bounds(field)]
     return " ".join([_type_name(field.annotation), ", ".join(bounds)]).strip()
 
@@ -62,8 +62,8 @@ def _type_name(annotation: Any) -> str:
     if get_origin(annotation) in (Union, types.UnionType):
         (annotation,) = (one for one in get_args(annotation) if one is not type(None))
     if get_origin(annotation) is list:
-        return "JSON list of texts"
-    names = {int: "integer", float: "number", bool: "`true` or `false`", Path: "path"}
+        return "JSON list"
+    names = {int: "integer", float: "number", bool: "boolean", Path: "path"}
     return names.get(annotation, "text")
 
 

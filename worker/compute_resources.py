@@ -1,4 +1,7 @@
-"""Resources that a job is computed with; without models, for the program that computes a job begins without them."""
+"""Resources that a job is computed with.
+
+It has no models: the program that computes a job begins without them.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""The heartbeat of a worker, and its name, which no other worker may have at the same time."""
+"""Heartbeat and name of a worker.
+
+No other worker may have the name at the same time.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The files of jobs in the blob store, for the worker: reads frames, writes pictures."""
+"""Files of jobs in the blob store: reads frames, writes pictures."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The process that computes one job: starts the job program, reads its messages, reports how it ended.
+"""The process of one job: starts the job program and reads its messages.
 
 The program decodes files that strangers sent. So it gets the task and the files, and no access to database or store.
 """

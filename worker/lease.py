@@ -1,4 +1,6 @@
-"""Leases of a worker on the jobs that it computes: each attempt holds one and asks it whether to go on.
+"""Leases of a worker on the jobs that it computes.
+
+Each attempt holds one, and asks it whether to go on.
 
 A lease is the row of the job with the run token of the attempt, which is its fencing token (Kleppmann, "How to do
 distributed locking", 2016): an attempt whose token is no longer in the row writes nothing.

@@ -1,4 +1,4 @@
-"""The protocol between a worker and a job program, over the program's standard input and output.
+"""Protocol between a worker and a job program, over standard input and output.
 
 In: a line of JSON, a `JobRequest`, and the bytes of the files. Out: lines of JSON, a `Message` each; the bytes of
 the pictures follow the line that announces them. So the program needs no store, and nobody tidies up after it.

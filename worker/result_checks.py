@@ -1,4 +1,4 @@
-"""Checks of what a job program reports, before any of it is stored.
+"""Checks of a job program's report before it is stored.
 
 The models of the protocol say what each number is, not that it can be: a program that has gone wrong must cost its job
 alone, at once and in words, and leave nothing that nobody can read or send back.

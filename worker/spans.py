@@ -1,4 +1,4 @@
-"""OpenTelemetry spans of an attempt: one for all of it, below the span of the request, and in it one per stage."""
+"""OpenTelemetry spans of an attempt and its stages."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The worker process takes jobs out of the queue and computes each in a child process of its own.
+"""The worker process: takes jobs out of the queue, computes each in a child process.
 
 A crash in native code, a time limit or a cancellation costs a child and with it one job, never the worker. The worker
 itself may be killed at any moment: its job is begun again, by itself when it comes back or by another worker that finds

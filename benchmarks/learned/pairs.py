@@ -8,7 +8,7 @@ gaps, players, lines of other pitches, stands. Cameras and pitches are random; n
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -81,16 +81,7 @@ def _other_lines(pitch: Field, rng: np.random.Generator) -> LinePoints:
     turned = points.position[:, :2] @ np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]]) + shift
     kept = np.isin(points.marking, np.flatnonzero(rng.random(points.marking.max() + 1) < 0.8))
     kept[0] = True
-    points = points[kept]
-    return LinePoints(
-        pitch.lift(turned[kept]),
-        points.tangent,
-        points.normal,
-        points.width,
-        points.marking,
-        points.colour,
-        points.spacing,
-    )
+    return replace(points[kept], position=pitch.lift(turned[kept]))
 
 
 def random_camera(pitch: Field, rng: np.random.Generator) -> Camera:

@@ -1,1 +1,1 @@
-"""Middleware and limits around every request: authentication, rates, sizes, and problems as answers."""
+"""Middleware of every request: authentication, rates, sizes, problems as answers."""

@@ -80,7 +80,8 @@ async def _actor(request: Request) -> Actor | None:
 InContext = Annotated[Context, Depends(_context)]
 # Who makes the change that a request asks for.
 ByActor = Annotated[Actor | None, Depends(_actor)]
-VenueIdPath = Annotated[str, Path(pattern=ID_PATTERN, examples=["tsukuba"])]
+VenueIdPath = Annotated[str, Path(pattern=ID_PATTERN, description="Id of the venue.", examples=["tsukuba"])]
+CameraIdPath = Annotated[str, Path(pattern=ID_PATTERN, description="Id of the camera.")]
 
 
 def _check_job_id(job_id: str) -> str:
@@ -93,5 +94,9 @@ def _check_job_id(job_id: str) -> str:
 JobIdPath = Annotated[
     str,
     AfterValidator(_check_job_id),
-    Path(json_schema_extra={"pattern": JOB_ID_PATTERN}, examples=["01KAJ3Q6WZ5T3Y8R0N4M2C7B1D"]),
+    Path(
+        description="Id of the job.",
+        json_schema_extra={"pattern": JOB_ID_PATTERN},
+        examples=["01KAJ3Q6WZ5T3Y8R0N4M2C7B1D"],
+    ),
 ]

@@ -36,7 +36,7 @@ def convert(
         typer.Argument(
             metavar="IN...",
             exists=True,
-            help="Files of one format, a folder of them or a zip. The format is told by the content.",
+            help="Files of one format, a folder of them or a zip. The content says which format it is.",
         ),
     ],
     output: Annotated[

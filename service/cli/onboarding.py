@@ -96,7 +96,7 @@ def intrinsics(
         ),
     ] = None,
     model: Annotated[
-        LensModel, typer.Option("--model", help="Lens model: opencv, or fisheye (Kannala-Brandt) for very wide lenses.")
+        LensModel, typer.Option("--model", help="Lens model: opencv, or fisheye (Kannala-Brandt) for wide ones.")
     ] = "opencv",
     picture: Annotated[
         Path | None, typer.Option("--picture", help="JPEG file to draw into where in the frame the board was seen.")

@@ -40,7 +40,7 @@ def run(
     """Calibrate a venue's file by frames, without a service. Exit codes as of `calibrate`."""
     settings, job_options = engine_settings(), parse_options(options)
     if job_options.callback_url is not None:
-        print_note("callback_url is not used: without a service nobody is told. The exit code says how it went.")
+        print_note("callback_url is not used: there is no service. The exit code says how it went.")
     from worker.calibration.records import NOT_RECORDED
     from worker.compute_resources import ComputeResources
     from worker.jobs import calibration

@@ -54,7 +54,7 @@ def stitch(
             "--offset",
             metavar="CAMERA=SECONDS",
             help="How much later a camera's clip began than the first one: right=0.120, or in frames of its own, "
-            "right=3f. Otherwise found by what moves where both see, or told by the clocks of cameras (RTSP).",
+            "right=3f. Otherwise found by what moves where both see, or by the clocks of cameras (RTSP).",
         ),
     ] = None,
     audio: Annotated[

@@ -1,1 +1,1 @@
-"""Poses and lenses in the formats of other tools, written and read."""
+"""Poses and lenses in the formats of other tools."""

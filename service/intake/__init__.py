@@ -1,1 +1,1 @@
-"""Intake of frames: they are sent or fetched, checked, stored, and queued as a job."""
+"""Intake of frames, sent or fetched: checked, stored, queued as a job."""

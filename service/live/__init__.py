@@ -1,1 +1,1 @@
-"""Poses where renderers listen: OpenTrackIO and FreeD over UDP, at the rate of the pictures."""
+"""Live poses for renderers: OpenTrackIO and FreeD over UDP."""

@@ -1,1 +1,1 @@
-"""Logs, metrics, traces, readiness and free disk space, for the operator."""
+"""Logs, metrics, traces, readiness and free disk space."""

@@ -1,4 +1,4 @@
-"""The operator's web pages: rendered on the server, with a little JavaScript and nothing from the internet."""
+"""The operator's web pages, rendered on the server, with nothing from the internet."""
 
 from fastapi import APIRouter
 

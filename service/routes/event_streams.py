@@ -13,7 +13,7 @@ from starlette.concurrency import run_in_threadpool
 
 from service.api.context import InContext, VenueIdPath
 from service.routes.contract.attribution import hide_other_actor
-from service.routes.contract.documented import needs_scope, problem_responses
+from service.routes.contract.documented import needs_scope
 from service.routes.contract.followed import FOLLOWER_SLOT, LONGEST_S
 from service.routes.contract.guarded import Guarded
 from service.schemas.events.venue_event import FINAL_EVENT
@@ -55,10 +55,9 @@ def _followed_venue(venue_id: VenueIdPath, context: InContext, seen: LastSeenNum
     "/venues/{venue_id}/events",
     openapi_extra=needs_scope("read"),
     response_class=EventSourceResponse,
-    responses=problem_responses(404),
     dependencies=[FOLLOWER_SLOT],
 )
-async def venue_events(
+async def stream_venue_events(
     venue_id: Annotated[str, Depends(_followed_venue)],
     context: InContext,
     seen: LastSeenNumber,
@@ -87,7 +86,7 @@ async def venue_events(
                 await context.venue_watch.until(venue_id, number.__lt__, LONGEST_POLL_INTERVAL_S)
     except (*DATABASE_OUTAGES, UnreadableRow):
         # The client connects again, as after any stream that broke off.
-        log.warning("cannot tell of a venue", exc_info=True)
+        log.warning("cannot stream events of a venue", exc_info=True)
 
 
 def _server_sent_event(event: NumberedEvent) -> ServerSentEvent:

@@ -11,8 +11,9 @@ from starlette.concurrency import run_in_threadpool
 
 from service.api.context import InContext
 from service.observability.readiness import DECIDES
-from service.routes.contract.documented import FOR_ALL, needs_scope, problem_responses
+from service.routes.contract.documented import FOR_ALL, needs_scope
 from service.routes.contract.guarded import Guarded
+from service.routes.contract.problem_docs import problem_responses
 from service.schemas.health import Health
 from service.schemas.names import problem_uri, refusal_uri
 from service.schemas.problems import PROBLEM_TYPES, REFUSAL_REASONS, REFUSALS_DOCUMENT, Problem
@@ -23,13 +24,13 @@ router = APIRouter(tags=["health"], route_class=Guarded)
 
 
 @router.get("/livez", openapi_extra=FOR_ALL)
-async def livez() -> Health:
+async def check_liveness() -> Health:
     """Answer while the process is alive."""
     return Health(status="ok")
 
 
 @router.get("/readyz", openapi_extra=FOR_ALL, responses={503: {"model": Health}})
-async def readyz(context: InContext, response: Response) -> Health:
+async def check_readiness(context: InContext, response: Response) -> Health:
     """Tell whether this process can answer: its database does. `warnings` has what else a job needs and is missing.
 
     That is told within 3 s, whatever hangs.
@@ -50,7 +51,7 @@ async def readyz(context: InContext, response: Response) -> Health:
     response_class=Response,
     responses={200: {"content": {"text/plain": {}}}},
 )
-async def metrics(context: InContext) -> Response:
+async def get_metrics(context: InContext) -> Response:
     """Return the figures of the service for Prometheus."""
     for name, part in (await context.readiness.look()).items():
         context.metrics.parts.labels(name).set(part.ok)
@@ -58,8 +59,10 @@ async def metrics(context: InContext) -> Response:
     return Response(figures, media_type=CONTENT_TYPE_PLAIN_0_0_4)
 
 
-@router.get("/problems/{kind}", openapi_extra=FOR_ALL, responses=problem_responses(404))
-async def explain(kind: Annotated[str, Path(max_length=64)], response: Response) -> dict[str, str | int]:
+@router.get("/problems/{kind}", openapi_extra=FOR_ALL, responses=problem_responses("not-found"))
+async def explain_problem(
+    kind: Annotated[str, Path(max_length=64, description="Last part of the `type`.")], response: Response
+) -> dict[str, str | int]:
     """Explain what the `type` of a problem means; browsers (`Accept: text/html`) get a page."""
     response.headers.update(OF_PROGRAMS)
     if kind not in PROBLEM_TYPES:
@@ -67,8 +70,10 @@ async def explain(kind: Annotated[str, Path(max_length=64)], response: Response)
     return {"type": problem_uri(kind), "title": PROBLEM_TYPES[kind].title, "status": PROBLEM_TYPES[kind].status}
 
 
-@router.get("/refusals/{reason}", openapi_extra=FOR_ALL, responses=problem_responses(404))
-async def explain_refusal(reason: Annotated[str, Path(max_length=64)], response: Response) -> dict[str, str]:
+@router.get("/refusals/{reason}", openapi_extra=FOR_ALL, responses=problem_responses("not-found"))
+async def explain_refusal(
+    reason: Annotated[str, Path(max_length=64, description="Last part of the `refusal`.")], response: Response
+) -> dict[str, str]:
     """Explain what the `refusal` of a camera means: what it looks like, and what to do. Browsers get a page."""
     response.headers.update(OF_PROGRAMS)
     if reason not in REFUSAL_REASONS:

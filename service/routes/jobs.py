@@ -14,14 +14,15 @@ from starlette.concurrency import run_in_threadpool
 
 from service.api.context import ByActor, Context, InContext, JobIdPath
 from service.routes.contract.attribution import hide_other_asker
-from service.routes.contract.documented import needs_scope, problem_responses
-from service.routes.contract.exported import DOCUMENTS, ExportQuery, export_response, with_refined_poses
+from service.routes.contract.documented import needs_scope
+from service.routes.contract.exported import DOCUMENTS, ExportQuery, FormatQuery, export_response, with_refined_poses
 from service.routes.contract.guarded import Guarded
-from service.routes.contract.paged import NEXT_PAGE, next_page
+from service.routes.contract.paged import CURSOR, LIMIT, NEXT_PAGE, next_page
+from service.routes.contract.problem_docs import OF_EXPORTS, problem_responses
 from service.routes.contract.restricted import OnlyVenues, lists_by_venue
 from service.routes.contract.tagged import TAGGED, IfNoneMatch, tagged_response
 from service.schemas.job import Job, Jobs
-from service.schemas.names import ID_PATTERN, JOB_ID_PATTERN, OPEN_STATUSES, FormatName, JobKind, JobStatus, ListFields
+from service.schemas.names import ID_PATTERN, JOB_ID_PATTERN, OPEN_STATUSES, JobKind, JobStatus, ListFields
 from service.schemas.problems import Problem
 from service.schemas.results import Result
 from service.store.blobs import BLOB_OUTAGES
@@ -85,11 +86,11 @@ def list_jobs(
     only: OnlyVenues,
     request: Request,
     response: Response,
-    venue: Annotated[str | None, Query(pattern=ID_PATTERN)] = None,
-    status: JobStatus | None = None,
-    kind: JobKind | None = None,
-    limit: Annotated[int, Query(ge=1, le=200)] = 50,
-    cursor: Annotated[str | None, Query(pattern=JOB_ID_PATTERN)] = None,
+    venue: Annotated[str | None, Query(pattern=ID_PATTERN, description="Only jobs of this venue.")] = None,
+    status: Annotated[JobStatus | None, Query(description="Only jobs in this state.")] = None,
+    kind: Annotated[JobKind | None, Query(description="Only jobs of this kind.")] = None,
+    limit: Annotated[int, Query(ge=1, le=200, description=LIMIT)] = 50,
+    cursor: Annotated[str | None, Query(pattern=JOB_ID_PATTERN, description=CURSOR)] = None,
     fields: Annotated[ListFields, Query(description="`summary`: a line of each, in `summaries`.")] = "all",
 ) -> Jobs:
     """List jobs, newest first, in pages; with a key for some venues, theirs."""
@@ -110,7 +111,7 @@ def list_jobs(
     "/{job_id}",
     openapi_extra=needs_scope("read"),
     response_model=Job,
-    responses=TAGGED | problem_responses(404),
+    responses=TAGGED,
 )
 async def get_job(
     job: ExistingJob,
@@ -125,16 +126,16 @@ async def get_job(
     return job_response(job, if_none_match=if_none_match)
 
 
-@router.post(
-    "/{job_id}/cancel", openapi_extra=needs_scope("calibrate"), response_model=Job, responses=problem_responses(404)
-)
+@router.post("/{job_id}/cancel", openapi_extra=needs_scope("calibrate"), response_model=Job)
 async def cancel_job(state: ExistingState, job_id: JobIdPath, context: InContext, by: ByActor) -> Response:  # noqa: ARG001
     """End a job that is still open: queued at once, running within two seconds. Others stay as they are."""
     await run_in_threadpool(context.decisions.cancel, job_id, by)
     return job_response(await _existing_job(job_id, context))
 
 
-@router.delete("/{job_id}", openapi_extra=needs_scope("admin"), status_code=204, responses=problem_responses(404, 409))
+@router.delete(
+    "/{job_id}", openapi_extra=needs_scope("admin"), status_code=204, responses=problem_responses("job-open")
+)
 def delete_job(state: ExistingState, job_id: JobIdPath, context: InContext) -> None:
     """Forget a job that has ended, with its frames and its pictures. Poses that it brought to its venue stay."""
     if state.status in OPEN_STATUSES:
@@ -154,7 +155,7 @@ def delete_job(state: ExistingState, job_id: JobIdPath, context: InContext) -> N
     "/{job_id}/accept",
     openapi_extra=needs_scope("calibrate"),
     response_model=Job,
-    responses=problem_responses(404, 409, 422),
+    responses=problem_responses("poses-not-found", "venue-moved-on", "poses-refused"),
 )
 def accept_job(
     job: ExistingJob,
@@ -177,7 +178,7 @@ def accept_job(
     "/{job_id}/reject",
     openapi_extra=needs_scope("calibrate"),
     response_model=Job,
-    responses=problem_responses(404, 409),
+    responses=problem_responses("poses-not-found", "venue-moved-on", "poses-refused"),
 )
 def reject_job(job: ExistingJob, context: InContext, by: ByActor) -> Response:
     """Restore the poses from before a calibration. Nothing changes if its own were never stored or are no more.
@@ -211,9 +212,9 @@ async def _waiter_place(context: InContext) -> AsyncIterator[None]:
     openapi_extra=needs_scope("read"),
     response_class=EventSourceResponse,
     dependencies=[Depends(_require_unseen_events), Depends(_waiter_place)],
-    responses={204: {"description": "The event of `Last-Event-ID` was the end"}, **problem_responses(404)},
+    responses={204: {"description": "The event of `Last-Event-ID` was the end"}},
 )
-async def job_events(job: ExistingJob, context: InContext) -> AsyncIterable[ServerSentEvent]:
+async def stream_job_events(job: ExistingJob, context: InContext) -> AsyncIterable[ServerSentEvent]:
     """Stream the job as server-sent events: `progress` whenever it changes and every 10 s, `end` when it has ended."""
     while not context.job_watch.closed:
         try:
@@ -234,13 +235,13 @@ async def job_events(job: ExistingJob, context: InContext) -> AsyncIterable[Serv
     "/{job_id}/poses",
     openapi_extra=needs_scope("read"),
     response_class=Response,
-    responses=DOCUMENTS | problem_responses(404),
+    responses=DOCUMENTS | problem_responses("poses-not-found", *OF_EXPORTS),
 )
-def job_poses(
+def export_job_poses(
     job: ExistingJob,
     context: InContext,
     wanted: Annotated[ExportQuery, Depends()],
-    form: Annotated[FormatName, Query(alias="format")] = "json",
+    form: FormatQuery = "json",
 ) -> Response:
     """Export the poses that a job found, accepted or not, to another tool's format."""
     venue = context.jobs.posed(job.id)

@@ -14,9 +14,10 @@ from fastapi.sse import EventSourceResponse, ServerSentEvent
 from starlette.concurrency import run_in_threadpool
 
 from service.api.context import InContext, VenueIdPath
-from service.routes.contract.documented import needs_scope, problem_responses
+from service.routes.contract.documented import needs_scope
 from service.routes.contract.followed import FOLLOWER_SLOT, LONGEST_S
 from service.routes.contract.guarded import Guarded
+from service.routes.contract.problem_docs import problem_responses
 from service.routes.venues import ExistingVenue
 from service.schemas.live import LONGEST_HISTORY_MIN, LiveHistory, LiveReport, LiveState
 from service.store.database import DATABASE_OUTAGES
@@ -32,9 +33,9 @@ LONGEST_WAIT_S = 5
     "",
     status_code=204,
     openapi_extra=needs_scope("calibrate"),
-    responses=problem_responses(400, 404, 408, 413, 415),
+    responses=problem_responses("unknown-camera"),
 )
-def report_live(venue_id: VenueIdPath, report: LiveReport, context: InContext) -> None:
+def report_live_poses(venue_id: VenueIdPath, report: LiveReport, context: InContext) -> None:
     """Report how the live poses of a venue are doing; `esc live` does so twice a second.
 
     The newest report is kept, and what all of them say by the minute. Counts are those since the last report that was
@@ -43,8 +44,8 @@ def report_live(venue_id: VenueIdPath, report: LiveReport, context: InContext) -
     context.live.report(venue_id, report)
 
 
-@router.get("", openapi_extra=needs_scope("read"), responses=problem_responses(404))
-def live_state(venue: ExistingVenue, context: InContext) -> LiveState:
+@router.get("", openapi_extra=needs_scope("read"))
+def get_live_state(venue: ExistingVenue, context: InContext) -> LiveState:
     """Tell how the live poses of a venue are doing: the newest report of the process that sends them.
 
     A venue that never had one is `running: false` without cameras.
@@ -56,10 +57,9 @@ def live_state(venue: ExistingVenue, context: InContext) -> LiveState:
     "/poses",
     openapi_extra=needs_scope("read"),
     response_class=EventSourceResponse,
-    responses=problem_responses(404),
     dependencies=[FOLLOWER_SLOT],
 )
-async def live_poses(venue: ExistingVenue, context: InContext) -> AsyncIterable[ServerSentEvent]:
+async def stream_live_poses(venue: ExistingVenue, context: InContext) -> AsyncIterable[ServerSentEvent]:
     """Stream the newest report of a venue's live poses as server-sent events named `live`, at most twice a second.
 
     The first comes at once, the others when something has changed: a new report, or that none came for five seconds.
@@ -78,11 +78,11 @@ async def live_poses(venue: ExistingVenue, context: InContext) -> AsyncIterable[
                 return
     except DATABASE_OUTAGES:
         # The client connects again, as after any stream that broke off.
-        log.warning("cannot tell of live poses", exc_info=True)
+        log.warning("cannot stream live poses", exc_info=True)
 
 
-@router.get("/history", openapi_extra=needs_scope("read"), responses=problem_responses(404))
-def live_history(
+@router.get("/history", openapi_extra=needs_scope("read"))
+def get_live_history(
     venue: ExistingVenue,
     context: InContext,
     minutes: Annotated[

@@ -7,13 +7,13 @@ from typing import Annotated
 from fastapi import APIRouter, Path, Response
 from starlette.concurrency import run_in_threadpool
 
-from service.api.context import Context, InContext
-from service.routes.contract.documented import BINARY, needs_scope, problem_responses
+from service.api.context import CameraIdPath, Context, InContext
+from service.routes.contract.documented import BINARY, needs_scope
 from service.routes.contract.guarded import Guarded
+from service.routes.contract.problem_docs import problem_responses
 from service.routes.jobs import ExistingJob
 from service.schemas.file_kinds import PNG_START
 from service.schemas.job import Job
-from service.schemas.names import ID_PATTERN
 from service.schemas.problems import Problem
 from service.store.blobs import DamagedBlob
 from service.store.jobs.files import picture_file
@@ -21,36 +21,35 @@ from service.store.jobs.queries import Pictures
 
 router = APIRouter(prefix="/jobs", tags=["jobs"], route_class=Guarded)
 
-CameraPath = Annotated[str, Path(pattern=ID_PATTERN)]
 PNG, JPEG = "image/png", "image/jpeg"
 # Name of the route, address below that of the job, description. The picture's name is the address without its suffix,
 # with underscores for slashes.
 PICTURES = (
-    ("preview", "preview.jpg", "Draw one wide view stitched from all cameras by the poses that were found."),
-    ("preview_before", "preview/before.jpg", "Draw the stitched view by the poses that were stored."),
-    ("seam", "seam.png", "Draw where in the stitched view one camera hands over to another, to lay over it."),
-    ("birdseye", "birdseye.jpg", "Draw the pitch from above, 10 px/m, more of small ones."),
-    ("overlay", "overlay/{camera}.jpg", "Draw the field on a camera's frame, before and after."),
+    ("get_preview", "preview.jpg", "Draw one wide view stitched from all cameras by the poses that were found."),
+    ("get_preview_before", "preview/before.jpg", "Draw the stitched view by the poses that were stored."),
+    ("get_seam", "seam.png", "Draw where in the stitched view one camera hands over to another, to lay over it."),
+    ("get_birdseye", "birdseye.jpg", "Draw the pitch from above, 10 px/m, more of small ones."),
+    ("get_overlay", "overlay/{camera}.jpg", "Draw the field on a camera's frame, before and after."),
     (
-        "frame",
+        "get_camera_frame",
         "frame/{camera}.jpg",
         "Return a camera's frame, at most 1920 pixels wide, which the three layers are for.",
     ),
-    ("stored_layer", "stored/{camera}.png", "Draw the field by the pose that was stored, to lay over a frame."),
-    ("new_layer", "new/{camera}.png", "Draw the field by the pose that was found, to lay over a frame."),
-    ("mask_layer", "mask/{camera}.png", "Draw where the network saw markings, to lay over a frame."),
+    ("get_stored_layer", "stored/{camera}.png", "Draw the field by the pose that was stored, to lay over a frame."),
+    ("get_new_layer", "new/{camera}.png", "Draw the field by the pose that was found, to lay over a frame."),
+    ("get_mask_layer", "mask/{camera}.png", "Draw where the network saw markings, to lay over a frame."),
     (
-        "coverage",
+        "get_board_coverage",
         "coverage.jpg",
         "Draw where in the picture of a lens the board was seen, and residuals enlarged.",
     ),
     (
-        "candidate",
+        "get_candidate_overlay",
         "candidate/{camera}/{number}.jpg",
         "Draw the field on a camera's frame as a candidate of it has it, from 1, the best first.",
     ),
     (
-        "points",
+        "get_clicked_points",
         "points.jpg",
         "Draw the clicked points of a first pose and the pitch as the pose has it, in the frame if one was sent.",
     ),
@@ -63,11 +62,14 @@ def _show(route: str, address: str, shows: str) -> None:
     async def of_job(job: ExistingJob, context: InContext) -> Response:
         return await _picture(context, job, name)
 
-    async def of_camera(job: ExistingJob, camera: CameraPath, context: InContext) -> Response:
+    async def of_camera(job: ExistingJob, camera: CameraIdPath, context: InContext) -> Response:
         return await _picture(context, job, name.format(camera=camera))
 
     async def of_candidate(
-        job: ExistingJob, camera: CameraPath, number: Annotated[int, Path(ge=1, le=100)], context: InContext
+        job: ExistingJob,
+        camera: CameraIdPath,
+        number: Annotated[int, Path(ge=1, le=100, description="Number of the candidate, from 1.")],
+        context: InContext,
     ) -> Response:
         return await _picture(context, job, name.format(camera=camera, number=number))
 
@@ -79,7 +81,7 @@ def _show(route: str, address: str, shows: str) -> None:
         description=shows,
         openapi_extra=needs_scope("read"),
         response_class=Response,
-        responses={200: {"content": content}, **problem_responses(404, 410)},
+        responses={200: {"content": content}, **problem_responses("picture-not-found", "picture-deleted")},
     )
 
 
@@ -109,9 +111,16 @@ for each in PICTURES:
     "/{job_id}/frames/{number}",
     openapi_extra=needs_scope("read"),
     response_class=Response,
-    responses={200: {"content": {JPEG: BINARY, PNG: BINARY}}, **problem_responses(404, 410)},
+    responses={
+        200: {"content": {JPEG: BINARY, PNG: BINARY}},
+        **problem_responses("picture-not-found", "frames-deleted"),
+    },
 )
-def job_frame(job: ExistingJob, number: Annotated[int, Path(ge=0, le=10_000)], context: InContext) -> Response:
+def get_frame(
+    job: ExistingJob,
+    number: Annotated[int, Path(ge=0, le=10_000, description="Number of the frame, from 0.")],
+    context: InContext,
+) -> Response:
     """Return a frame or photo of a job as it came. `frames` of the job has the addresses of all."""
     path = context.jobs.frame(job.id, number)
     try:

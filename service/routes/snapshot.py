@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Any
 
-from fastapi import APIRouter, Path, Response
+from fastapi import APIRouter, Response
 from starlette.concurrency import run_in_threadpool
 
-from service.api.context import InContext, VenueIdPath
-from service.routes.contract.documented import BINARY, needs_scope, problem_responses
+from service.api.context import CameraIdPath, InContext, VenueIdPath
+from service.routes.contract.documented import BINARY, needs_scope
 from service.routes.contract.guarded import Guarded
+from service.routes.contract.problem_docs import OF_SOURCES, problem_responses
 from service.schemas.file_kinds import PNG_START
-from service.schemas.names import ID_PATTERN
 from service.store.refusals import camera_of, no_such_venue
 
 router = APIRouter(tags=["venues"], route_class=Guarded)
@@ -22,11 +22,22 @@ PICTURE: dict[int | str, dict[str, Any]] = {200: {"content": {"image/jpeg": BINA
     "/venues/{venue_id}/cameras/{camera}/snapshot",
     openapi_extra=needs_scope("read"),
     response_class=Response,
-    responses={**PICTURE, **problem_responses(404, 413, 422, 502)},
+    responses={
+        **PICTURE,
+        **problem_responses(
+            *OF_SOURCES,
+            "missing-camera",
+            "empty-frame",
+            "frame-too-large",
+            "not-an-image",
+            "broken-image",
+            "truncated-image",
+            "too-many-pixels",
+            "frame-size",
+        ),
+    },
 )
-async def snapshot(
-    venue_id: VenueIdPath, camera: Annotated[str, Path(pattern=ID_PATTERN)], context: InContext
-) -> Response:
+async def fetch_snapshot(venue_id: VenueIdPath, camera: CameraIdPath, context: InContext) -> Response:
     """Fetch a frame of a camera from its source, as it comes. Requests within two seconds get the same."""
     found = await run_in_threadpool(context.venues.with_credentials, venue_id)
     if found is None:

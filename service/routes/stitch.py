@@ -11,8 +11,9 @@ from starlette.concurrency import run_in_threadpool
 
 from service.api.context import Context, InContext
 from service.api.programs.drawings import drawable_frame
-from service.routes.contract.documented import BINARY, header_docs, needs_scope, problem_responses
+from service.routes.contract.documented import BINARY, header_docs, needs_scope
 from service.routes.contract.guarded import Guarded
+from service.routes.contract.problem_docs import problem_responses
 from service.routes.contract.tagged import TAGGED, IfNoneMatch, tagged_response
 from service.routes.venues import ExistingVenue
 from service.schemas import etags
@@ -55,10 +56,10 @@ class ViewQuery:
     responses={
         200: {"content": {ZIP: BINARY}, **header_docs("ETag")},
         304: TAGGED[304],
-        **problem_responses(404, 422, 503),
+        **problem_responses("view-too-large", "extra-missing"),
     },
 )
-async def stitch_package(
+async def export_stitched_view(
     venue: ExistingVenue,
     context: InContext,
     request: Request,
@@ -92,10 +93,10 @@ async def stitch_package(
     responses={
         200: {"content": {JPEG: BINARY}, **header_docs("ETag")},
         304: TAGGED[304],
-        **problem_responses(404, 422, 503),
+        **problem_responses("view-too-large", "no-frames", "extra-missing"),
     },
 )
-async def stitch_preview(
+async def draw_stitched_view(
     venue: ExistingVenue,
     context: InContext,
     view: Annotated[ViewQuery, Depends()],

@@ -6,23 +6,25 @@ from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime, time
 from typing import Annotated, Any, Literal
 
-from fastapi import APIRouter, Body, Depends, Header, Path, Query, Request, Response
+from fastapi import APIRouter, Body, Depends, Header, Query, Request, Response
 from pydantic import ValidationError
 
 from service.api.auth import missing_scope
-from service.api.context import ByActor, Context, InContext, VenueIdPath
+from service.api.context import ByActor, CameraIdPath, Context, InContext, VenueIdPath
 from service.api.problems import validation_problem
 from service.intake import sources
 from service.routes.contract.attribution import hide_other_actor
-from service.routes.contract.documented import header_docs, needs_scope, problem_responses
+from service.routes.contract.documented import header_docs, needs_scope
 from service.routes.contract.exported import (
     DOCUMENTS,
     ExportQuery,
+    FormatQuery,
     export_response,
     with_refined_poses,
 )
 from service.routes.contract.guarded import Guarded
-from service.routes.contract.paged import NEXT_PAGE, next_page
+from service.routes.contract.paged import CURSOR, LIMIT, NEXT_PAGE, next_page
+from service.routes.contract.problem_docs import OF_EXPORTS, problem_responses
 from service.routes.contract.restricted import OnlyVenues, lists_by_venue
 from service.routes.contract.tagged import TAGGED, IfNoneMatch, json_response, tagged_response
 from service.schemas import etags
@@ -32,7 +34,7 @@ from service.schemas.geometry import PoseIn
 from service.schemas.health import VenueHealth
 from service.schemas.history import AdoptField, AdoptFound, History, Restore
 from service.schemas.merge_patch import MEDIA_TYPE, apply_merge_patch
-from service.schemas.names import ID_PATTERN, FormatName, ListFields
+from service.schemas.names import ID_PATTERN, ListFields
 from service.schemas.problems import Problem
 from service.schemas.source_urls import SourceSecrets
 from service.schemas.trend import Trend
@@ -52,6 +54,7 @@ from service.store.refusals import camera_of, no_refined_since, no_such_venue
 router = APIRouter(prefix="/venues", tags=["venues"], route_class=Guarded)
 # Required parts of a camera; its id is the name that it is patched by.
 WHOLE_CAMERA = ("image_size", "intrinsics", "pose")
+OF_PUT = ("venue-changed", "venue-id-mismatch", "callback-refused", "source-refused", "poses-refused")
 PATCH_BODY: dict[str, Any] = {
     "requestBody": {
         "required": True,
@@ -79,18 +82,21 @@ ExistingVenue = Annotated[Venue, Depends(existing_venue)]
 ExistingVenueId = Annotated[str, Depends(_existing_venue_id)]
 
 
-async def _if_match(if_match: Annotated[str | None, Header()] = None) -> Precondition:
+IfMatchHeader = Annotated[str | None, Header(description="Only if the venue has this `ETag`.")]
+
+
+async def _if_match(if_match: IfMatchHeader = None) -> Precondition:
     return Precondition(if_match)
 
 
 async def _either_match(
-    if_match: Annotated[str | None, Header()] = None, if_none_match: Annotated[str | None, Header()] = None
+    if_match: IfMatchHeader = None,
+    if_none_match: Annotated[str | None, Header(description="`*`: only if the venue is not stored yet.")] = None,
 ) -> Precondition:
     return Precondition(if_match, if_none_match)
 
 
 IfMatch = Annotated[Precondition, Depends(_if_match)]
-CameraPath = Annotated[str, Path(pattern=ID_PATTERN)]
 
 
 @router.put(
@@ -99,7 +105,7 @@ CameraPath = Annotated[str, Path(pattern=ID_PATTERN)]
     responses={
         200: header_docs("ETag"),
         201: {"model": ChangedVenue, **header_docs("ETag")},
-        **problem_responses(400, 404, 408, 412, 413, 415, 422),
+        **problem_responses(*OF_PUT),
     },
 )
 def put_venue(
@@ -120,7 +126,7 @@ def put_venue(
 @router.patch(
     "/{venue_id}",
     openapi_extra=needs_scope("admin") | PATCH_BODY,
-    responses={200: header_docs("ETag"), **problem_responses(400, 404, 408, 412, 413, 415, 422)},
+    responses={200: header_docs("ETag"), **problem_responses(*OF_PUT)},
 )
 def patch_venue(
     venue_id: VenueIdPath,
@@ -156,11 +162,11 @@ def list_venues(
     only: OnlyVenues,
     request: Request,
     response: Response,
-    limit: Annotated[int, Query(ge=1, le=1000)] = 100,
-    cursor: Annotated[str | None, Query(pattern=ID_PATTERN)] = None,
+    limit: Annotated[int, Query(ge=1, le=1000, description=LIMIT)] = 100,
+    cursor: Annotated[str | None, Query(pattern=ID_PATTERN, description=CURSOR)] = None,
     q: Annotated[Name | None, Query(min_length=1, description="Only those whose id or name contains this.")] = None,
     state: Annotated[
-        Literal["ok", "alarm"] | None, Query(description="Only those of which an alarm rings, or none does.")
+        Literal["ok", "alarm"] | None, Query(description="Only those with an active alarm, or without one.")
     ] = None,
     fields: Annotated[ListFields, Query(description="`summary`: a line of each, in `summaries`.")] = "all",
 ) -> Venues:
@@ -180,7 +186,7 @@ def list_venues(
     "/{venue_id}",
     openapi_extra=needs_scope("read"),
     response_model=Venue,
-    responses=TAGGED | problem_responses(404),
+    responses=TAGGED,
 )
 def get_venue(venue: ExistingVenue, if_none_match: IfNoneMatch = None) -> Response:
     """Return a venue with the poses in use."""
@@ -192,13 +198,13 @@ def get_venue(venue: ExistingVenue, if_none_match: IfNoneMatch = None) -> Respon
     "/{venue_id}/poses",
     openapi_extra=needs_scope("read"),
     response_class=Response,
-    responses=DOCUMENTS | problem_responses(404),
+    responses=DOCUMENTS | problem_responses(*OF_EXPORTS),
 )
-def venue_poses(
+def export_venue_poses(
     venue: ExistingVenue,
     context: InContext,
     wanted: Annotated[ExportQuery, Depends()],
-    form: Annotated[FormatName, Query(alias="format")] = "json",
+    form: FormatQuery = "json",
 ) -> Response:
     """Export the poses in use to another tool's format; with `lens=refined` those of the last accepted job."""
     if wanted.lens == "refined":
@@ -211,14 +217,14 @@ def venue_poses(
     "/{venue_id}/history",
     openapi_extra=needs_scope("read"),
     response_model=History,
-    responses=TAGGED | {200: {"headers": TAGGED[200]["headers"] | NEXT_PAGE}} | problem_responses(404),
+    responses=TAGGED | {200: {"headers": TAGGED[200]["headers"] | NEXT_PAGE}},
 )
-def venue_history(
+def list_revisions(
     venue_id: ExistingVenueId,
     request: Request,
     context: InContext,
-    limit: Annotated[int, Query(ge=1, le=1000)] = 50,
-    cursor: Annotated[int | None, Query(ge=1, le=2**31 - 1)] = None,
+    limit: Annotated[int, Query(ge=1, le=1000, description=LIMIT)] = 50,
+    cursor: Annotated[int | None, Query(ge=1, le=2**31 - 1, description=CURSOR)] = None,
     if_none_match: IfNoneMatch = None,
 ) -> Response:
     """List every change of the poses with its cause, newest first, and how far each camera moved and has drifted."""
@@ -235,11 +241,11 @@ def venue_history(
     "/{venue_id}/cameras/{camera}/trend",
     openapi_extra=needs_scope("read"),
     response_model=Trend,
-    responses=TAGGED | problem_responses(404),
+    responses=TAGGED,
 )
-def camera_trend(
+def get_camera_trend(
     venue: ExistingVenue,
-    camera: CameraPath,
+    camera: CameraIdPath,
     context: InContext,
     since: Annotated[Day | None, Query(description="The first night to tell, a day of UTC; without it, all.")] = None,
     if_none_match: IfNoneMatch = None,
@@ -254,8 +260,8 @@ def camera_trend(
     return tagged_response(body, if_none_match, json_response(body))
 
 
-@router.get("/{venue_id}/health", openapi_extra=needs_scope("read"), responses=problem_responses(404))
-def venue_health(venue_id: VenueIdPath, context: InContext) -> VenueHealth:
+@router.get("/{venue_id}/health", openapi_extra=needs_scope("read"))
+def get_venue_health(venue_id: VenueIdPath, context: InContext) -> VenueHealth:
     """Tell how a venue is doing: the alarms that ring, since when and why, and how far its cameras have drifted."""
     health = context.venues.health(venue_id)
     if health is None:
@@ -266,7 +272,10 @@ def venue_health(venue_id: VenueIdPath, context: InContext) -> VenueHealth:
 @router.post(
     "/{venue_id}/restore",
     openapi_extra=needs_scope("calibrate"),
-    responses={200: header_docs("ETag"), **problem_responses(400, 404, 408, 409, 412, 413, 415)},
+    responses={
+        200: header_docs("ETag"),
+        **problem_responses("revision-not-found", "revision-unfit", "venue-changed", "poses-refused"),
+    },
 )
 def restore_venue(
     venue_id: VenueIdPath,
@@ -288,11 +297,11 @@ def restore_venue(
 @router.post(
     "/{venue_id}/cameras/{camera}/adopt-refined",
     openapi_extra=needs_scope("calibrate"),
-    responses={200: header_docs("ETag"), **problem_responses(404, 412)},
+    responses={200: header_docs("ETag"), **problem_responses("refined-not-found", "venue-changed", "poses-refused")},
 )
-def adopt_refined(
+def adopt_refined_pose(
     venue_id: VenueIdPath,
-    camera: CameraPath,
+    camera: CameraIdPath,
     response: Response,
     context: InContext,
     by: ByActor,
@@ -308,9 +317,19 @@ def adopt_refined(
 @router.post(
     "/{venue_id}/adopt-field",
     openapi_extra=needs_scope("calibrate"),
-    responses={200: header_docs("ETag"), **problem_responses(400, 404, 408, 409, 412, 413, 415)},
+    responses={
+        200: header_docs("ETag"),
+        **problem_responses(
+            "job-not-found",
+            "field-number-not-found",
+            "field-number-refused",
+            "venue-moved-on",
+            "venue-changed",
+            "poses-refused",
+        ),
+    },
 )
-def adopt_field(
+def adopt_field_number(
     venue_id: VenueIdPath,
     wanted: AdoptField,
     response: Response,
@@ -333,10 +352,19 @@ def adopt_field(
     responses={
         200: header_docs("ETag"),
         201: {"model": Venue, **header_docs("ETag")},
-        **problem_responses(400, 404, 408, 409, 412, 413, 415, 422),
+        **problem_responses(
+            "job-not-found",
+            "poses-not-found",
+            "candidate-not-found",
+            "candidate-needed",
+            "candidate-refused",
+            "venue-moved-on",
+            "venue-changed",
+            "poses-refused",
+        ),
     },
 )
-def adopt_found(
+def adopt_found_cameras(
     venue_id: VenueIdPath,
     wanted: AdoptFound,
     request: Request,
@@ -359,7 +387,10 @@ def adopt_found(
 
 
 @router.delete(
-    "/{venue_id}", openapi_extra=needs_scope("admin"), status_code=204, responses=problem_responses(404, 409, 412)
+    "/{venue_id}",
+    openapi_extra=needs_scope("admin"),
+    status_code=204,
+    responses=problem_responses("venue-busy", "venue-changed"),
 )
 def delete_venue(venue_id: VenueIdPath, context: InContext, by: ByActor, precondition: IfMatch) -> None:
     """Forget a venue and the history of its poses. Its jobs stay, with frames and pictures: `DELETE /jobs/{id}`."""

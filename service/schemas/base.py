@@ -7,6 +7,7 @@ stored rows) are read by the same models with `TOLERANTLY`.
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 from datetime import date
 from typing import Annotated, Any
 
@@ -15,12 +16,14 @@ from pydantic import (
     BeforeValidator,
     ConfigDict,
     Field,
+    GetJsonSchemaHandler,
     StringConstraints,
     ValidationError,
     ValidationInfo,
     ValidatorFunctionWrapHandler,
     WrapValidator,
 )
+from pydantic.json_schema import JsonSchemaValue
 
 from service.schemas.names import ID_PATTERN
 
@@ -66,21 +69,62 @@ def _or_a_newer_word(word: Any, check: ValidatorFunctionWrapHandler, info: Valid
         raise
 
 
-# Annotation of an enumeration that newer versions may extend.
-OPEN_WORD = WrapValidator(_or_a_newer_word)
+class _OpenWord(WrapValidator):
+    """Annotation of an enumeration that newer versions may extend: in answers, clients have to expect other words."""
+
+    def __get_pydantic_json_schema__(self, schema: Any, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        made = handler(schema)
+        words = made.pop("enum", None) or [made.pop("const")] if handler.mode == "serialization" else None
+        return made if words is None else {**made, "x-extensible-enum": words}
+
+
+OPEN_WORD = _OpenWord(_or_a_newer_word)
+
+
+@dataclass(frozen=True)
+class OpenChoice:
+    """Annotation of a union that newer versions may extend: in answers, clients have to expect other objects.
+
+    `discriminator`: the member that says which object it is; `title`, `description`: of the objects to come.
+    """
+
+    discriminator: str
+    title: str
+    description: str
+
+    def __get_pydantic_json_schema__(self, schema: Any, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        known = handler(schema)
+        if handler.mode == "validation":
+            return known
+        word = {"type": "string", "description": "A word of a later version."}
+        other = {"title": self.title, "description": self.description, "type": "object"}
+        return {"anyOf": [known, {**other, "properties": {self.discriminator: word}, "required": [self.discriminator]}]}
 
 
 class Schema(BaseModel):
-    """A model of the interface: unknown fields are errors, unless a document is read `TOLERANTLY`."""
+    """A model of the interface: unknown fields are errors, unless a document is read `TOLERANTLY`.
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    Its JSON schema is closed for what clients send, and open for answers, to which later versions may add fields.
+    """
+
+    # What an answer has is always there, at its default too.
+    model_config = ConfigDict(extra="forbid", frozen=True, json_schema_serialization_defaults_required=True)
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, schema: Any, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        made = handler(schema)
+        if handler.mode == "serialization":
+            handler.resolve_ref_schema(made).pop("additionalProperties", None)
+        return made
 
 
 class Unreadable(Schema):
     """A stored entry that this version cannot read, and the reason."""
 
-    id: str
-    why: str = Field(examples=["field: the ridge must be 0 to 3 m high, not -0.001 m"])
+    id: str = Field(description="Id of the entry.")
+    why: str = Field(
+        examples=["field: the ridge must be 0 to 3 m high, not -0.001 m"], description="Reason why it cannot be read."
+    )
 
 
 UNREADABLE = "Entries of this page that are stored but cannot be read; absent if there are none."

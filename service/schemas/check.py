@@ -38,7 +38,7 @@ class CameraCheck(Schema):
     sigma_px: float | None
     off_m: float | None
     sigma_m: float | None
-    detail: str | None = Field(description="Why nothing can be told, and what to do.")
+    detail: str | None = Field(description="Why there is no grade, and what to do.")
     image_size: list[int]
     pose: Pose | None
     intrinsics: Intrinsics | None

@@ -42,11 +42,11 @@ MAX_OTHER_FIELDS = 16
 
 
 class ArcIn(Schema):
-    """An arc around `centre`, counter-clockwise seen from above from `start` to `end`, along the paint's middle."""
+    """An arc along the paint's middle, counter-clockwise seen from above."""
 
-    centre: PitchPoint
-    start: PitchPoint
-    end: PitchPoint
+    centre: PitchPoint = Field(description="Centre, [x, y] in metres.")
+    start: PitchPoint = Field(description="Where the arc begins, [x, y] in metres.")
+    end: PitchPoint = Field(description="Where it ends, [x, y] in metres.")
 
     @model_validator(mode="after")
     def _round(self) -> Self:
@@ -57,24 +57,26 @@ class ArcIn(Schema):
 
 
 class CircleIn(Schema):
-    """A full circle, `radius_m` to the middle of the paint."""
+    """A full circle."""
 
-    centre: PitchPoint
-    radius_m: Length
+    centre: PitchPoint = Field(description="Centre, [x, y] in metres.")
+    radius_m: Length = Field(description="Radius to the middle of the paint, m.")
 
 
 class SpotIn(Schema):
     """A disc of paint."""
 
-    centre: PitchPoint
-    diameter_m: PaintWidth
+    centre: PitchPoint = Field(description="Centre, [x, y] in metres.")
+    diameter_m: PaintWidth = Field(description="Diameter, m.")
 
 
 class MarkingIn(Schema):
-    """One painted marking: exactly one of `line`, `arc`, `circle` and `spot`. Points are [x, y] from the centre, m."""
+    """One painted marking: exactly one of `line`, `arc`, `circle` and `spot`."""
 
-    name: Annotated[Name, Field(min_length=1)]
-    line: Annotated[list[PitchPoint], Field(min_length=2, max_length=200)] | None = None
+    name: Annotated[Name, Field(min_length=1)] = Field(description="Name of the marking.")
+    line: Annotated[list[PitchPoint], Field(min_length=2, max_length=200)] | None = Field(
+        None, description="Points of a line of straight pieces, [x, y] in metres."
+    )
     arc: ArcIn | None = None
     circle: CircleIn | None = None
     spot: SpotIn | None = None
@@ -97,8 +99,10 @@ class MarkingIn(Schema):
 class Layout(Schema):
     """Custom markings instead of a template, and names for points that can be clicked."""
 
-    markings: Annotated[list[MarkingIn], Field(min_length=1, max_length=500)]
-    points: Annotated[dict[Annotated[Name, Field(min_length=1)], PitchPoint], Field(max_length=1000)] = Field({})
+    markings: Annotated[list[MarkingIn], Field(min_length=1, max_length=500)] = Field(description="Painted markings.")
+    points: Annotated[dict[Annotated[Name, Field(min_length=1)], PitchPoint], Field(max_length=1000)] = Field(
+        {}, description="Points that can be clicked, [x, y] in metres by name."
+    )
 
 
 def _as_a_template(name: str, info: ValidationInfo) -> str:
@@ -116,13 +120,13 @@ TemplateName = Annotated[str, AfterValidator(_as_a_template), WithJsonSchema({"t
 
 
 class OtherField(Schema):
-    """A field of another sport on the same ground. Dimensions that are not given are the template's."""
+    """A field of another sport on the same ground."""
 
-    template: TemplateName
-    length_m: Length | None = None
-    width_m: Length | None = None
-    line_width_m: PaintWidth | None = None
-    measures_m: dict[str, Number] = Field({})
+    template: TemplateName = Field(description="Name of the sport's template.")
+    length_m: Length | None = Field(None, description="Length along its x axis; absent: the template's.")
+    width_m: Length | None = Field(None, description="Width along its y axis; absent: the template's.")
+    line_width_m: PaintWidth | None = Field(None, description="Width of its lines; absent: the template's.")
+    measures_m: dict[str, Number] = Field({}, description="Other dimensions that the template lets you set, by name.")
     centre: PitchPoint = Field([0.0, 0.0], description="Position of its centre on the venue's field, m.")
     turned_deg: Annotated[Number, Field(ge=-360, le=360)] = Field(
         0.0, description="Angle from the venue's x axis to its own, counter-clockwise seen from above."
@@ -176,7 +180,10 @@ class FieldOfPlay(Schema):
     width_m: Length = Field(description="Width along y; absent: the template's.")
     line_width_m: PaintWidth = Field(description="Width of the lines; absent: the template's.")
     measures_m: dict[str, Number] = Field({}, description="Other dimensions that the template lets you set, by name.")
-    ridge: Annotated[list[Row], Field(min_length=2, max_length=2)] | None = None
+    ridge: Annotated[list[Row], Field(min_length=2, max_length=2)] | None = Field(
+        None,
+        description="Both ends of the ridge of a crowned surface, [x, y, z] in m, with one y and one z; null: flat.",
+    )
     uneven_m: Annotated[Number, Field(ge=0.001, le=0.1)] | None = Field(
         None,
         description="Unevenness of the ground: one standard deviation of its height around the plane, or around the "

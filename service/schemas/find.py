@@ -24,7 +24,7 @@ FieldSide = Annotated[
 class SoughtCameraIn(Schema):
     """A camera whose pose is searched for. Whatever is known about it makes the search faster and more reliable."""
 
-    id: Id
+    id: Id = Field(description="Id of the camera; its frames are parts of this name.")
     image_size: Annotated[list[Side], Field(min_length=2, max_length=2)] | None = Field(
         None, description="Width, height in pixels. Absent: the size of its frame."
     )
@@ -39,10 +39,12 @@ class SoughtCameraIn(Schema):
     )
     pose: PoseIn | None = Field(None, description="Pose of a camera that need not be found.")
     position: Position | None = Field(None, description="Approximate position, m: within `position_radius_m`.")
-    position_radius_m: Annotated[Number, Field(gt=0, le=1000)] = 10.0
+    position_radius_m: Annotated[Number, Field(gt=0, le=1000)] = Field(
+        10.0, description="Largest distance from `position`, m."
+    )
     side: FieldSide | None = None
     ignore: Ignore = Field([])
-    source: SourceUrl | None = None
+    source: SourceUrl | None = Field(None, description="Address of its frames; only for a stored venue.")
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -59,7 +61,9 @@ class SoughtCameraIn(Schema):
 class SoughtSite(NamedField):
     """A venue whose cameras may lack poses and lenses, as the part `site` of a request has it."""
 
-    cameras: Annotated[list[SoughtCameraIn], Field(min_length=1, max_length=32)]
+    cameras: Annotated[list[SoughtCameraIn], Field(min_length=1, max_length=32)] = Field(
+        description="Cameras of the venue; those without a pose are searched for."
+    )
 
     @model_validator(mode="after")
     def _cameras_differ(self) -> Self:

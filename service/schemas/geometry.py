@@ -98,7 +98,9 @@ class Intrinsics(Schema):
     model: Annotated[LensModel, OPEN_WORD] = Field(
         "opencv", description="`fisheye`: OpenCV's fisheye module (Kannala-Brandt)."
     )
-    matrix: Annotated[list[Row], Field(min_length=3, max_length=3)]
+    matrix: Annotated[list[Row], Field(min_length=3, max_length=3)] = Field(
+        description="OpenCV's camera matrix [[fx, skew, cx], [0, fy, cy], [0, 0, 1]], pixels."
+    )
     distortion: Annotated[
         list[Annotated[Number, Field(ge=-LARGEST_COEFFICIENT, le=LARGEST_COEFFICIENT)]], Field(max_length=14)
     ] = Field(description="0, 4, 5, 8, 12 or 14 coefficients; 0 or 4 for `fisheye`.")
@@ -157,16 +159,21 @@ class Light(Schema):
     """Photometric correction of a camera, so that it matches the other cameras of a stitched view where they overlap.
 
     A value t of 0 to 255 becomes `gain` * 100 * (t / 100) ** (1 + `contrast`), times exp(`falloff` * r²), r from 0 in
-    the middle of the frame to 1 in its corners. `reach`: logarithm of an extra weight of the camera, which moves its
-    seams.
+    the middle of the frame to 1 in its corners.
     """
 
     gain: Annotated[list[Annotated[Number, Field(ge=0.25, le=4)]], Field(min_length=3, max_length=3)] = Field(
         description="Gain of red, green and blue.", examples=[[1.06, 1.0, 0.94]]
     )
-    contrast: Annotated[Number, Field(ge=-0.5, le=0.5)] = 0.0
-    falloff: Annotated[Number, Field(ge=-1, le=1)] = 0.0
-    reach: Annotated[Number, Field(ge=-3, le=3)] = 0.0
+    contrast: Annotated[Number, Field(ge=-0.5, le=0.5)] = Field(
+        0.0, description="Exponent beyond 1 of the contrast curve."
+    )
+    falloff: Annotated[Number, Field(ge=-1, le=1)] = Field(
+        0.0, description="Logarithm of the gain in the corners beside the middle."
+    )
+    reach: Annotated[Number, Field(ge=-3, le=3)] = Field(
+        0.0, description="Logarithm of an extra weight of the camera, which moves its seams."
+    )
 
 
 def require_camera_id(camera_id: str) -> None:
@@ -193,7 +200,7 @@ def check_lens(lens: Intrinsics, image_size: list[int]) -> None:
 class UnposedCamera(Schema):
     """A camera without its pose: id, image size and lens."""
 
-    id: Id
+    id: Id = Field(description="Id of the camera; parts of uploads have this name.")
     image_size: Annotated[list[Side], Field(min_length=2, max_length=2)] = Field(description="Width, height in pixels.")
     intrinsics: Intrinsics
 
@@ -229,11 +236,11 @@ class LensFile(BaseModel):
 
 
 class Moved(Schema):
-    """Movement from one pose to another; `pixels`: mean shift of the visible pitch in the picture."""
+    """Movement from one pose to another."""
 
-    rotation_deg: float
-    position_m: float
-    pixels: float | None
+    rotation_deg: float = Field(description="Angle between the two poses, degrees.")
+    position_m: float = Field(description="Distance between the two positions, m.")
+    pixels: float | None = Field(description="Mean shift of the visible pitch in the picture; null: none is in view.")
 
 
 class Movement(Schema):

@@ -91,27 +91,27 @@ SETTINGS: dict[AlarmRule, AlarmSetting] = {
 
 
 class Alarm(Schema):
-    """An active alarm of one camera, or of the whole venue (`camera` is null)."""
+    """An active alarm of one camera, or of the whole venue."""
 
-    rule: Annotated[AlarmRule, OPEN_WORD]
+    rule: Annotated[AlarmRule, OPEN_WORD] = Field(description="Rule that is broken.")
     setting: Annotated[AlarmSetting, OPEN_WORD] | None = Field(
         default_factory=lambda alarm: SETTINGS.get(alarm["rule"]),
         description="Name of the rule in the venue's `alarms`; null for a rule that only a newer version knows.",
     )
-    camera: Id | None
-    since: datetime
-    why: str
+    camera: Id | None = Field(description="Id of the camera; null: the whole venue.")
+    since: datetime = Field(description="Time at which it began.")
+    why: str = Field(description="Reason in words.")
 
 
 class CalibrationEnd(Schema):
     """The last calibration of a venue that ended; without a result, the fields that need one are null."""
 
-    status: Annotated[JobStatus, OPEN_WORD]
-    finished_at: datetime
-    dry_run: bool
-    verdict: Annotated[Verdict, OPEN_WORD] | None = None
-    stitch_error_px: float | None = None
-    moved_px: float | None = None
+    status: Annotated[JobStatus, OPEN_WORD] = Field(description="Status that it ended in.")
+    finished_at: datetime = Field(description="Time of its end.")
+    dry_run: bool = Field(description="True if it was not to change the stored poses.")
+    verdict: Annotated[Verdict, OPEN_WORD] | None = Field(None, description="Verdict on its poses.")
+    stitch_error_px: float | None = Field(None, description="Stitch error of its poses; 1 px is 10 cm on the pitch.")
+    moved_px: float | None = Field(None, description="Largest movement of the pitch in a camera's picture, pixels.")
 
 
 class CameraHealth(RevisionCamera):
@@ -122,10 +122,10 @@ class CameraHealth(RevisionCamera):
 
 
 class VenueHealth(Schema):
-    """Health of a venue. `state` is `alarm` while one of its alarms is active."""
+    """Health of a venue."""
 
-    state: Annotated[Literal["ok", "alarm"], OPEN_WORD]
-    alarms: list[Alarm]
+    state: Annotated[Literal["ok", "alarm"], OPEN_WORD] = Field(description="`alarm` while one of `alarms` is active.")
+    alarms: list[Alarm] = Field(description="Active alarms.")
     revision: int = Field(description="Number of the current revision of the poses.")
     cameras: list[CameraHealth] = Field(description="Current poses of the cameras and their movements.")
     stitch_error_px: float | None = Field(description="Stitch error of the current poses, by the last result.")
@@ -137,7 +137,7 @@ class VenueHealth(Schema):
 class VenueAlarm(Alarm):
     """An alarm and the id of its venue."""
 
-    venue: Id
+    venue: Id = Field(description="Id of the venue.")
 
 
 class AlarmEvent(Attributed):
@@ -146,7 +146,7 @@ class AlarmEvent(Attributed):
     Every attempt has the same `webhook-id`.
     """
 
-    type: Literal["alarm.began", "alarm.ended"]
+    type: Literal["alarm.began", "alarm.ended"] = Field(description="`alarm.began` or `alarm.ended`.")
     timestamp: datetime = Field(description="Time at which the alarm began or ended.")
     data: VenueAlarm
 
@@ -154,7 +154,7 @@ class AlarmEvent(Attributed):
 class Health(Schema):
     """Readiness of an API process, and the state of each part of the service."""
 
-    status: Annotated[Literal["ok", "unavailable"], OPEN_WORD]
+    status: Annotated[Literal["ok", "unavailable"], OPEN_WORD] = Field(description="`ok` if this process can answer.")
     parts: dict[str, str] = Field({}, description="State of each part: `ok`, or what is wrong with it.")
     warnings: dict[str, str] = Field(
         {}, description="Parts that are missing although this process can answer: meanwhile jobs wait or fail."

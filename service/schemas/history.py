@@ -16,20 +16,22 @@ from service.schemas.names import JOB_ID_PATTERN, FieldNumber
 class RevisionCamera(Movement):
     """Pose and movement of a camera in a revision of its venue."""
 
-    id: Id
+    id: Id = Field(description="Id of the camera.")
     pose: Pose
 
 
 class NumberChange(Schema):
-    """Value of a dimension of the field before and after a revision, m."""
+    """Value of a dimension of the field before and after a revision."""
 
-    before: float
-    after: float
+    before: float = Field(description="Value before, m.")
+    after: float = Field(description="Value after, m.")
 
 
-# Causes of revisions: put: PUT or PATCH; calibrated: an accepted calibration; recovered: a calibration that found a
-# knocked camera again; accepted: a result accepted by hand; restored: an older revision; adopted: the refined pose and
-# lens of a camera, or a dimension of the field; found: cameras that a search found from their frames.
+CAUSES = (
+    "`put`: PUT or PATCH; `calibrated`: an accepted calibration; `recovered`: one that found a knocked camera; "
+    "`accepted`: a result accepted by hand; `restored`: an older revision; `adopted`: the refined pose and lens of a "
+    "camera, or a dimension of the field; `found`: a search for cameras."
+)
 Cause = Literal["put", "calibrated", "recovered", "accepted", "restored", "adopted", "found"]
 
 
@@ -67,27 +69,27 @@ class Revision(Schema):
     )
 
     revision: int = Field(description="Number of the revision, from 1; the newest is in use.")
-    at: datetime
-    cause: Annotated[Cause, OPEN_WORD]
+    at: datetime = Field(description="Time since which it is in use.")
+    cause: Annotated[Cause, OPEN_WORD] = Field(description=f"Cause of the change: {CAUSES}")
     job: str | None = Field(
         description="Job that found these poses; for a restored revision, the job whose poses were rejected by hand."
     )
     restored_from: int | None = Field(description="Number of the revision that was restored.")
     stitch_error_px: float | None = Field(description="Stitch error by the job; null: not measured.")
-    ridge: list[Row] | None
+    ridge: list[Row] | None = Field(description="Ridge that the poses belong to, as in the field; null: flat.")
     field_numbers: dict[Annotated[FieldNumber, OPEN_WORD], NumberChange] = Field(
         {}, description="Dimensions of the field that were adopted or restored with it, by name; otherwise {}."
     )
-    cameras: list[RevisionCamera]
+    cameras: list[RevisionCamera] = Field(description="Poses and movements.")
     by: Actor | None = Field(None, description=f"{BY} For a calibration: its submitter.")
 
 
 class History(Schema):
-    """A page of revisions, newest first. `next_cursor`: null on the last page."""
+    """A page of revisions."""
 
-    revisions: list[Revision]
+    revisions: list[Revision] = Field(description="Revisions, newest first.")
     unreadable: list[Unreadable] = Field([], exclude_if=is_empty, description=UNREADABLE)
-    next_cursor: int | None = None
+    next_cursor: int | None = Field(None, description="`cursor` of the next page; null on the last.")
 
 
 class Restore(Schema):
@@ -95,7 +97,7 @@ class Restore(Schema):
 
     model_config = ConfigDict(json_schema_extra={"examples": [{"revision": 1}]})
 
-    revision: Annotated[Integer, Field(ge=1, le=2**31 - 1)]
+    revision: Annotated[Integer, Field(ge=1, le=2**31 - 1)] = Field(description="Number of the revision.")
 
 
 class AdoptField(Schema):
@@ -105,8 +107,10 @@ class AdoptField(Schema):
         json_schema_extra={"examples": [{"job": "01KAJ3Q6WZ5T3Y8R0N4M2C7B1D", "name": "ridge_height_m"}]}
     )
 
-    job: Annotated[str, StringConstraints(pattern=JOB_ID_PATTERN)]
-    name: FieldNumber
+    job: Annotated[str, StringConstraints(pattern=JOB_ID_PATTERN)] = Field(
+        description="Id of the calibration that offers it."
+    )
+    name: FieldNumber = Field(description="Dimension to store.")
 
 
 class AdoptFound(Schema):
@@ -116,7 +120,7 @@ class AdoptFound(Schema):
         json_schema_extra={"examples": [{"job": "01KAJ3Q6WZ5T3Y8R0N4M2C7B1D", "candidates": {"right": 2}}]}
     )
 
-    job: Annotated[str, StringConstraints(pattern=JOB_ID_PATTERN)]
+    job: Annotated[str, StringConstraints(pattern=JOB_ID_PATTERN)] = Field(description="Id of the search.")
     candidates: dict[Id, Annotated[Integer, Field(ge=1, le=100)] | None] = Field(
         {},
         json_schema_extra={"additionalProperties": False},

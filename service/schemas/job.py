@@ -5,7 +5,13 @@ from __future__ import annotations
 from datetime import datetime
 from typing import Annotated, Any, Literal, get_args
 
-from pydantic import ConfigDict, Field, ValidationInfo, ValidatorFunctionWrapHandler, WrapValidator
+from pydantic import (
+    ConfigDict,
+    Field,
+    ValidationInfo,
+    ValidatorFunctionWrapHandler,
+    WrapValidator,
+)
 
 from service.schemas.actor import Attributed
 from service.schemas.base import OPEN_WORD, UNREADABLE, Schema, Unreadable, is_empty, is_none, is_tolerant
@@ -14,12 +20,14 @@ from service.schemas.results import AnyResult
 
 
 class Progress(Schema):
-    """Progress of a running job; `fraction`: 0..1 of the whole job."""
+    """Progress of a running job."""
 
-    stage: Annotated[Literal["segmentation", "evolution", "refinement", "preview", "detection", "fit"], OPEN_WORD]
-    fraction: float = Field(ge=0, le=1)
-    generation: int | None = None
-    loss: float | None = None
+    stage: Annotated[Literal["segmentation", "evolution", "refinement", "preview", "detection", "fit"], OPEN_WORD] = (
+        Field(description="Stage that is being computed.")
+    )
+    fraction: float = Field(ge=0, le=1, description="Progress 0..1 of the whole job.")
+    generation: int | None = Field(None, description="Generation of the search.")
+    loss: float | None = Field(None, description="Loss of the best candidate so far.")
     expected_end: datetime | None = Field(
         None,
         exclude_if=is_none,
@@ -30,25 +38,30 @@ class Progress(Schema):
 class JobError(Schema):
     """Reason of a failed job, with the members of a problem (RFC 9457)."""
 
-    type: str
-    title: str
-    detail: str
-    camera: str | None = None
+    type: str = Field(description="Type of the problem: an address that explains it.")
+    title: str = Field(description="The type in words.")
+    detail: str = Field(description="Reason, and what to do.")
+    camera: str | None = Field(None, description="Id of the camera that it is about, if it is one.")
 
 
 class CallbackState(Schema):
     """Delivery of the callback of an ended job to the `callback_url` of its options."""
 
-    state: Annotated[Literal["waiting", "delivered", "given-up"], OPEN_WORD]
+    state: Annotated[Literal["waiting", "delivered", "given-up"], OPEN_WORD] = Field(
+        description="`waiting` for the next attempt, `delivered`, or `given-up` after the last."
+    )
     attempts: int = Field(description="Attempts begun so far.")
     last_error: str | None = Field(description="Reason of the last failed attempt.")
     next_attempt_at: datetime | None = Field(description="Time of the next attempt; null unless waiting.")
 
 
-def _or_none_of_a_newer_kind(result: Any, check: ValidatorFunctionWrapHandler, info: ValidationInfo) -> Any:
+def _read_result(result: Any, check: ValidatorFunctionWrapHandler, info: ValidationInfo) -> Any:
     """Return the result, or None for a kind of job that only a newer version knows."""
-    newer = is_tolerant(info) and info.data.get("kind") not in get_args(JobKind)
-    return None if newer else check(result)
+    kind = info.data.get("kind")
+    if is_tolerant(info) and kind not in get_args(JobKind):
+        return None
+    # Earlier releases stored results without their kind.
+    return check({"kind": kind} | result if isinstance(result, dict) else result)
 
 
 class Job(Schema):
@@ -81,21 +94,25 @@ class Job(Schema):
         }
     )
 
-    id: str
-    kind: Annotated[JobKind, OPEN_WORD] = "calibration"
+    id: str = Field(description="Id of the job.")
+    kind: Annotated[JobKind, OPEN_WORD] = Field(
+        "calibration", description="Kind of computation, which decides what `result` has."
+    )
     venue: str | None = Field(
         description="Id of the venue; null for the intrinsics of a lens. For a search for cameras, the venue need not "
         "be stored yet."
     )
-    status: Annotated[JobStatus, OPEN_WORD]
+    status: Annotated[JobStatus, OPEN_WORD] = Field(description="State of the job; the last three are final.")
     progress: Progress | None
     queue_position: int | None = Field(description="Position in the queue, 1 = next; null unless queued.")
     attempt: int = Field(description="Number of starts of the job; above 1 after a crash of its worker.")
-    created_at: datetime
-    started_at: datetime | None
-    finished_at: datetime | None
+    created_at: datetime = Field(description="Time of its submission.")
+    started_at: datetime | None = Field(description="Time of its last start; null while queued.")
+    finished_at: datetime | None = Field(description="Time of its end; null while open.")
     error: JobError | None
-    result: Annotated[AnyResult | None, WrapValidator(_or_none_of_a_newer_kind)]
+    result: Annotated[AnyResult | None, WrapValidator(_read_result)] = Field(
+        description="Result, by the kind of job; null before its end, and of a job that failed or was cancelled."
+    )
     callback: CallbackState | None = Field(
         None, description="Delivery of the callback; null before the end, without `callback_url`, and in callbacks."
     )
@@ -127,7 +144,9 @@ class JobEvent(Attributed):
     Webhooks and event streams of the venue also get `job.queued`, when a job is submitted.
     """
 
-    type: Literal["job.queued", "job.succeeded", "job.failed", "job.cancelled"]
+    type: Literal["job.queued", "job.succeeded", "job.failed", "job.cancelled"] = Field(
+        description="`job.` and the status."
+    )
     timestamp: datetime = Field(description="Time of the event.")
     data: Job = Field(description="The job at its end; for `job.queued`, at its submission.")
 
@@ -141,27 +160,27 @@ class JobEvent(Attributed):
 class JobSummary(Schema):
     """Summary of a job: state and progress, without its result."""
 
-    id: str
-    kind: Annotated[JobKind, OPEN_WORD]
-    venue: str | None
-    status: Annotated[JobStatus, OPEN_WORD]
+    id: str = Field(description="Id of the job.")
+    kind: Annotated[JobKind, OPEN_WORD] = Field(description="Kind of computation.")
+    venue: str | None = Field(description="Id of the venue; null for the intrinsics of a lens.")
+    status: Annotated[JobStatus, OPEN_WORD] = Field(description="State of the job.")
     progress: Progress | None
-    attempt: int
-    created_at: datetime
-    started_at: datetime | None
-    finished_at: datetime | None
+    attempt: int = Field(description="Number of starts.")
+    created_at: datetime = Field(description="Time of its submission.")
+    started_at: datetime | None = Field(description="Time of its last start; null while queued.")
+    finished_at: datetime | None = Field(description="Time of its end; null while open.")
     error: JobError | None
     verdict: str | None = Field(description="Verdict of a calibration's result.")
     stitch_error_px: float | None = Field(description="Stitch error of a calibration's result.")
-    asked_by: str | None
+    asked_by: str | None = Field(description="Submitter, as in the job.")
 
 
 class Jobs(Schema):
-    """A page of jobs, newest first. `next_cursor`: null on the last page."""
+    """A page of jobs."""
 
-    jobs: list[Job]
+    jobs: list[Job] = Field(description="Jobs, newest first.")
     summaries: list[JobSummary] | None = Field(
         None, exclude_if=is_none, description="Only with `fields=summary`, and then instead of `jobs`."
     )
     unreadable: list[Unreadable] = Field([], exclude_if=is_empty, description=UNREADABLE)
-    next_cursor: str | None = None
+    next_cursor: str | None = Field(None, description="`cursor` of the next page; null on the last.")

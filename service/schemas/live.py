@@ -41,23 +41,23 @@ StreamAddress = Annotated[Name, StringConstraints(min_length=1, max_length=1024)
 
 
 class LatencyMs(Schema):
-    """Latency from the arrival of a picture to the sending of its pose, ms: median and 99th percentile."""
+    """Latency from the arrival of a picture to the sending of its pose."""
 
-    p50: Milliseconds
-    p99: Milliseconds
+    p50: Milliseconds = Field(description="Median, ms.")
+    p99: Milliseconds = Field(description="99th percentile, ms.")
 
 
 class LiveSigma(Schema):
     """One standard deviation of a measured pose."""
 
-    rotation_deg: Annotated[Number, Field(ge=0, le=180)]
-    position_m: Annotated[Number, Field(ge=0, le=2000)]
+    rotation_deg: Annotated[Number, Field(ge=0, le=180)] = Field(description="Of the rotation, degrees.")
+    position_m: Annotated[Number, Field(ge=0, le=2000)] = Field(description="Of the position, m.")
 
 
 class _LiveCamera(Schema):
     """A camera whose poses are sent, without its pose. Counts are of pictures since the last report."""
 
-    id: Id
+    id: Id = Field(description="Id of the camera.")
     status: Annotated[LiveStatus, OPEN_WORD] = Field(
         description="`stored`: the camera has no stream, its stored pose is sent. `measured`: its lines were measured "
         "within the last two seconds. `coasted`: lines were not looked for or not seen, the filter predicts the pose. "
@@ -139,16 +139,16 @@ class LiveReport(Schema):
 
     model_config = ConfigDict(json_schema_extra={"examples": [PROCESS_EXAMPLE | {"cameras": [CAMERA_EXAMPLE]}]})
 
-    started_at: Timestamp
+    started_at: Timestamp = Field(description="Time at which the process started.")
     host: Annotated[Name, StringConstraints(min_length=1, max_length=255)] = Field(
         description="Host that the process runs on."
     )
-    pid: Annotated[Integer, Field(ge=0, le=2**31 - 1)] | None = None
+    pid: Annotated[Integer, Field(ge=0, le=2**31 - 1)] | None = Field(None, description="Number of the process.")
     destinations: Annotated[list[Name], Field(max_length=100)] = Field(
         description="Destinations of the poses, in words such as `opentrackio multicast`."
     )
     stopped: Flag = Field(False, description="The last report of a process that was stopped on purpose: no alarm.")
-    cameras: Annotated[list[LiveCameraIn], Field(max_length=32)]
+    cameras: Annotated[list[LiveCameraIn], Field(max_length=32)] = Field(description="Cameras whose poses are sent.")
 
     @model_validator(mode="after")
     def _each_camera_once(self) -> Self:
@@ -161,9 +161,9 @@ class LiveReport(Schema):
 class LiveSender(Schema):
     """Another process that sends a venue's live poses, besides the one that reported last."""
 
-    host: str
-    pid: int | None = None
-    started_at: datetime
+    host: str = Field(description="Host that it runs on.")
+    pid: int | None = Field(None, description="Number of its process.")
+    started_at: datetime = Field(description="Time of its start.")
     reported_at: datetime = Field(description="Time of its last report.")
     running: bool = Field(description="True if that is at most five seconds ago.")
 
@@ -175,12 +175,12 @@ class LiveState(Schema):
     running: bool = Field(
         False, description="True if that is at most five seconds ago and the process was not stopped."
     )
-    started_at: datetime | None = None
-    host: str | None = None
-    pid: int | None = None
-    destinations: list[str] = Field([])
+    started_at: datetime | None = Field(None, description="Time at which the process started.")
+    host: str | None = Field(None, description="Host that it runs on.")
+    pid: int | None = Field(None, description="Number of the process.")
+    destinations: list[str] = Field([], description="Addresses and protocols that poses are sent to.")
     stopped: bool = Field(False, description="True if the process was stopped on purpose.")
-    cameras: list[LiveCamera] = Field([])
+    cameras: list[LiveCamera] = Field([], description="Cameras whose poses are sent.")
     others: list[LiveSender] = Field(
         [], description="Other processes that report about the venue, or were running until they fell silent: run one."
     )
@@ -189,10 +189,10 @@ class LiveState(Schema):
 class LiveMinuteCamera(Schema):
     """A camera in a minute: counts of its pictures, and the worst turn and latency of its reports."""
 
-    pictures: int = 0
-    measured: int = 0
-    coasted: int = 0
-    refused: int = 0
+    pictures: int = Field(0, description="Pictures that arrived.")
+    measured: int = Field(0, description="Pictures in which lines were measured.")
+    coasted: int = Field(0, description="Pictures whose pose was predicted.")
+    refused: int = Field(0, description="Pictures whose lines contradicted the prediction.")
     turned_deg: float | None = Field(None, description="The largest turn from its stored pose.")
     latency_ms: LatencyMs | None = Field(None, description="The worst of the minute's reports.")
 
@@ -215,11 +215,11 @@ class LiveMinute(Schema):
     """A minute of live poses."""
 
     at: datetime = Field(description="Beginning of the minute.")
-    cameras: dict[Id, LiveMinuteCamera]
+    cameras: dict[Id, LiveMinuteCamera] = Field(description="Counts by camera.")
 
 
 class LiveHistory(Schema):
-    """Minutes of a venue's live poses, oldest first; minutes without a report are left out."""
+    """Minutes of a venue's live poses."""
 
-    venue: Id
-    minutes: list[LiveMinute]
+    venue: Id = Field(description="Id of the venue.")
+    minutes: list[LiveMinute] = Field(description="Minutes with a report, oldest first.")

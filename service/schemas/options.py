@@ -17,7 +17,9 @@ CHARUCO_PATTERN = r"^((4X4|5X5|6X6|7X7)_(50|100|250|1000)|ARUCO_ORIGINAL|APRILTA
 class Handling(Schema):
     """Options of every kind of job."""
 
-    priority: Annotated[Literal["live", "routine"], OPEN_WORD] = "routine"
+    priority: Annotated[Literal["live", "routine"], OPEN_WORD] = Field(
+        "routine", description="`live` jobs are computed before `routine` ones."
+    )
     timeout_s: Annotated[Number, Field(ge=1, le=3600)] | None = Field(
         None, description="Time limit; absent: the service's default."
     )
@@ -31,12 +33,14 @@ class Options(Handling):
 
     model_config = ConfigDict(json_schema_extra={"examples": [{"preset": "esc", "seed": 7, "dry_run": True}]})
 
-    preset: Annotated[Literal["esc", "paper", "scpr"], OPEN_WORD] = "esc"
+    preset: Annotated[Literal["esc", "paper", "scpr"], OPEN_WORD] = Field(
+        "esc", description="Method: `esc`, or one of the published ones that it is compared with, `paper` and `scpr`."
+    )
     search: Annotated[Literal["auto", "wide", "anywhere"], OPEN_WORD] = Field(
         "auto",
-        description="`auto`: no search if the cameras stand almost as stored, else a search around the stored poses, "
-        "and last, for a camera whose lines are clearly visible but not where its pose expects them, a search at its "
-        "stored position in any direction. `wide`: always around the stored poses, and nowhere else. `anywhere`: for "
+        description="`auto`: no search if the cameras stand almost as stored, else a search around the stored poses. "
+        "Last, a camera whose lines are clearly visible but not where its pose expects them is searched for at its "
+        "stored position, in any direction. `wide`: always around the stored poses, and nowhere else. `anywhere`: for "
         "every camera, first at its stored position and then elsewhere.",
     )
     seed: Annotated[Integer, Field(ge=0, le=2**53 - 1)] | None = Field(None, description="Absent: one is chosen.")
@@ -79,8 +83,8 @@ class Charuco(Schema):
 class Board(Schema):
     """A chessboard or ChArUco board: columns and rows are its inner corners, where four squares meet."""
 
-    columns: Annotated[Integer, Field(ge=3, le=100)]
-    rows: Annotated[Integer, Field(ge=3, le=100)]
+    columns: Annotated[Integer, Field(ge=3, le=100)] = Field(description="Inner corners in a row.")
+    rows: Annotated[Integer, Field(ge=3, le=100)] = Field(description="Inner corners in a column.")
     square_m: Annotated[Number, Field(gt=0, le=10)] = Field(description="Side of a square, m.")
     charuco: Charuco | None = None
 
@@ -97,7 +101,9 @@ class IntrinsicsOptions(Handling):
     model_config = ConfigDict(json_schema_extra={"examples": [{"board": {"columns": 9, "rows": 6, "square_m": 0.03}}]})
 
     board: Board
-    model: Annotated[LensModel, OPEN_WORD] = "opencv"
+    model: Annotated[LensModel, OPEN_WORD] = Field(
+        "opencv", description="Lens model to fit: OpenCV's usual one, or its fisheye module's."
+    )
 
 
 Coordinates = Annotated[list[Metres], Field(min_length=2, max_length=3)]
@@ -107,8 +113,10 @@ Landmark = Annotated[str, StringConstraints(min_length=1, max_length=200)]
 class ClickedPoint(Schema):
     """A clicked point of the pitch: its name or [x, y] or [x, y, z] in metres, and its pixel."""
 
-    world: Landmark | Coordinates
-    pixel: Annotated[list[Number], Field(min_length=2, max_length=2)]
+    world: Landmark | Coordinates = Field(description="Name of a point of the field, or [x, y] or [x, y, z] in metres.")
+    pixel: Annotated[list[Number], Field(min_length=2, max_length=2)] = Field(
+        description="Where it was clicked, [x, y] in pixels."
+    )
 
 
 class ClickedPoints(RootModel[dict[Id, Annotated[list[ClickedPoint], Field(min_length=4, max_length=500)]]]):
@@ -133,7 +141,7 @@ class LocateOptions(Handling):
         }
     )
 
-    points: Annotated[list[ClickedPoint], Field(min_length=4, max_length=500)]
+    points: Annotated[list[ClickedPoint], Field(min_length=4, max_length=500)] = Field(description="Clicked points.")
 
 
 class FieldOptions(Handling):

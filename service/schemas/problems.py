@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Field
 
 from service.schemas.names import problem_uri
 
@@ -281,7 +281,7 @@ class ProblemDetails(BaseModel):
         },
     )
 
-    type: str
-    title: str
-    status: int
-    detail: str
+    type: str = Field(description="Type of the problem: an address below this service that explains it.")
+    title: str = Field(description="The type in words.")
+    status: int = Field(description="HTTP status.")
+    detail: str = Field(description="Reason, and what to do.")

@@ -9,22 +9,24 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from service.schemas.base import OPEN_WORD, Id, Schema
+from service.schemas.base import OPEN_WORD, Id, OpenChoice, Schema
 from service.schemas.field import FieldOfPlay
 from service.schemas.geometry import Intrinsics, Light, Moved, Pose, Row
 from service.schemas.names import FieldNumber, Verdict
 from service.schemas.options import Coordinates, Landmark
 from service.schemas.trend import Displacement
 
+KIND = "Kind of the job, which says what the result has."
 NO_CHOICE: Mapping[str, int | None] = MappingProxyType({})
+TIMINGS = "Seconds by stage."
 CPU_S: Any = Field({}, description="Core-seconds of all threads by stage, as in `timings_s`; {} from earlier releases.")
 
 
 class Sigma(Schema):
     """One standard deviation of a pose."""
 
-    rotation_deg: float
-    position_m: float
+    rotation_deg: float = Field(description="Of the rotation, degrees.")
+    position_m: float = Field(description="Of the position, m.")
     ground_m: float | None = Field(
         None,
         description="Of the place on the field that pose and lens give a pixel, at the worst marking in view: what the "
@@ -39,10 +41,14 @@ Cause = Literal["dark", "fogged", "blinded", "snow", "out-of-focus", "blocked", 
 class View(Schema):
     """Usability of a camera's frame, and what is wrong with it."""
 
-    usable: bool
-    cause: Annotated[Cause, OPEN_WORD] | None = None
+    usable: bool = Field(description="True if the frame can be calibrated.")
+    cause: Annotated[Cause, OPEN_WORD] | None = Field(
+        None,
+        description="What is wrong with it, see `GET /refusals/view`; `other-camera` and `no-markings-in-view` are "
+        "refusals of their own.",
+    )
     where: str | None = Field(None, description="Affected part of the visible field.")
-    detail: str
+    detail: str = Field(description="The same in words, and what to do.")
     lines_found: float | None = Field(
         None, description="Share 0..1 of sampled points of the expected lines at which a line is seen, before a search."
     )
@@ -61,7 +67,7 @@ class MarkingResult(Schema):
     (x) and left, far (y) and near.
     """
 
-    name: str
+    name: str = Field(description="Name of the marking.")
     expected_m: float = Field(description="Length of the marking that should be in view.")
     found: float = Field(description="Share 0..1 of that length that is seen where the pose puts it.")
     offset_cm: float | None = Field(
@@ -104,14 +110,11 @@ class Refined(Schema):
 
 
 class LensChange(Schema):
-    """Change of a camera's focal length since the first nights of its memory.
+    """Change of a camera's focal length since the first nights of its memory."""
 
-    It is longer by the share `longer` ± `sigma` (0.001 is 0.1 %) than at `since`; null: unknown.
-    """
-
-    longer: float
-    sigma: float
-    since: datetime | None
+    longer: float = Field(description="Relative difference of the focal length: 0.001 is 0.1 % longer.")
+    sigma: float = Field(description="One standard deviation of `longer`.")
+    since: datetime | None = Field(description="Time that it is compared with; null: unknown.")
     words: str | None = Field(
         description="The change in words; null while it is within three sigma.",
         examples=["focal length 0.6 ± 0.1 % longer than on 3 November: zoom ring or focus"],
@@ -130,20 +133,21 @@ class Proposal(Schema):
 class CrossCheck(Schema):
     """Cross-check of pose and lens: a fit to every second ten metres of the lines against a fit to the others.
 
-    The two put the farthest marking in view `apart_m` apart on the ground; `expected_m` is one standard deviation of
-    that by the sigmas of both. Several times as much means that sigma is too small for this camera.
+    An `apart_m` of several times `expected_m` means that sigma is too small for this camera.
     """
 
-    apart_m: float
-    expected_m: float
+    apart_m: float = Field(
+        description="Distance on the ground between the two fits at the farthest marking in view, m."
+    )
+    expected_m: float = Field(description="One standard deviation of that distance by the sigmas of both, m.")
 
 
 class CameraResult(Schema):
     """Result of a calibration for one camera."""
 
-    id: Id
+    id: Id = Field(description="Id of the camera.")
     accepted: bool = Field(description="True if the quality gate lets its pose replace the stored one.")
-    rejected_because: str | None
+    rejected_because: str | None = Field(description="Reason in words if the gate rejects the pose.")
     refusal: str | None = Field(
         None,
         description="Path at which the service explains the reason, and what to do.",
@@ -182,7 +186,9 @@ class CameraResult(Schema):
         description="Probability 0..1 that the pose is the right explanation of the frame, rather than one that other "
         "lines fit by chance; how precise it is, `sigma` says. Null if the frame cannot be used.",
     )
-    residual_px: float | None
+    residual_px: float | None = Field(
+        description="Root mean square of the distances from measured lines to the pose's, pixels."
+    )
     light: Light | None = Field(
         None,
         description="Photometric correction for stitched views with the other accepted cameras; kept with the pose.",
@@ -216,22 +222,20 @@ class CameraResult(Schema):
 
 
 class SeamPlace(Schema):
-    """A piece of line that two cameras see, around a point `at` [x, y] of the pitch, m.
+    """A piece of line that two cameras see, and how far apart they put it."""
 
-    The second camera puts its paint `error_cm` ± `sigma_cm` from where the first does, in the direction `across` the
-    line, a unit vector [x, y]. Along the line nothing is measured.
-    """
-
-    at: list[float]
-    across: list[float]
-    error_cm: float
-    sigma_cm: float
+    at: list[float] = Field(description="Point of the pitch, [x, y] in metres.")
+    across: list[float] = Field(
+        description="Direction across the line, a unit vector [x, y]: along the line nothing is measured."
+    )
+    error_cm: float = Field(description="Distance across the line from the first camera's paint to the second's, cm.")
+    sigma_cm: float = Field(description="One standard deviation of it, cm.")
 
 
 class PairResult(Schema):
     """Agreement of two cameras along their seam."""
 
-    cameras: list[Id]
+    cameras: list[Id] = Field(description="Ids of the two cameras.")
     stitch_error_px: float | None = Field(
         description="Stitch error at the centre of the pitch, or of the common view; null if the views do not match."
     )
@@ -244,36 +248,32 @@ class PairResult(Schema):
 class Provenance(Schema):
     """Software, network, seed and options: all that is needed to reproduce a result from its frames."""
 
-    software: str
-    model_sha256: str
-    seed: int
-    options: dict[str, Any]
+    software: str = Field(description="Version of ESC.")
+    model_sha256: str = Field(description="SHA-256 of the network's file.")
+    seed: int = Field(description="Seed of the random numbers.")
+    options: dict[str, Any] = Field(description="Options with all defaults.")
 
 
 class Suspicion(Schema):
-    """A parameter of a camera's lens, or a dimension of the field (`camera` is null), that the lines contradict.
+    """A parameter of a camera's lens, or a dimension of the field, that the lines contradict."""
 
-    It seems to be larger than in the venue by `deviation` ± `sigma`, in the unit at the end of `quantity`.
-    """
-
-    camera: Id | None
-    quantity: str
-    deviation: float
-    sigma: float
-    detail: str
+    camera: Id | None = Field(description="Id of the camera; null: the field.")
+    quantity: str = Field(description="Parameter or dimension, with its unit at the end.")
+    deviation: float = Field(description="How much larger than in the venue it seems to be.")
+    sigma: float = Field(description="One standard deviation of `deviation`.")
+    detail: str = Field(description="The same in words.")
 
 
 class AdoptableNumber(Schema):
-    """A dimension of the field that the lines determine and contradict, metres.
+    """A dimension of the field that the lines determine and contradict.
 
-    It is `given` in the venue that the job began with, and `value` ± `sigma` by the lines. `POST
-    /venues/{id}/adopt-field` stores that value; nothing is stored automatically.
+    `POST /venues/{id}/adopt-field` stores `value`; nothing is stored automatically.
     """
 
-    name: Annotated[FieldNumber, OPEN_WORD]
-    given: float
-    value: float
-    sigma: float
+    name: Annotated[FieldNumber, OPEN_WORD] = Field(description="Dimension of the field.")
+    given: float = Field(description="Value in the venue that the job began with, m.")
+    value: float = Field(description="Value by the lines, m.")
+    sigma: float = Field(description="One standard deviation of `value`, m.")
     moves_m: dict[Id, float] = Field(
         {},
         description="Approximate movement of each accepted camera with the new value, m: the same lines fitted again. "
@@ -284,10 +284,11 @@ class AdoptableNumber(Schema):
 class Result(Schema):
     """Result of a calibration. Stitch errors: 1 px is 10 cm on the pitch; a single camera has none."""
 
+    kind: Literal["calibration"] = Field("calibration", description=KIND)
     verdict: Annotated[Verdict, OPEN_WORD] = Field(description="Acceptance of the poses: of all cameras, some or none.")
     accepted: bool = Field(description="True if the poses of all cameras are accepted.")
     rejected_because: str | None = Field(description="All reasons, with the cameras that they concern.")
-    cameras: list[CameraResult]
+    cameras: list[CameraResult] = Field(description="Result for each camera of the venue.")
     ridge: list[Row] | None = Field(None, description="With fit_ridge: the ridge that was found.")
     diagnosis: list[Suspicion] = Field([], description="Parameters of the venue that the lines contradict.")
     adoptable: list[AdoptableNumber] = Field(
@@ -296,19 +297,21 @@ class Result(Schema):
     warnings: list[str] = Field(
         [], description="Assumptions that the venue leaves open, such as lenses without `sigma`; missing pictures."
     )
-    stitch_error_px: float | None
+    stitch_error_px: float | None = Field(
+        description="Distance between the positions that two cameras give the same markings: the worst pair's."
+    )
     stitch_error_before_px: float | None = Field(description="Stitch error of the stored poses in the same frames.")
     stitch_error_limit_px: float | None = Field(None, description="Largest stitch error that the gate accepts.")
     pairs: list[PairResult] = Field([], description="Pairs of cameras that were compared.")
     loss: float | None = Field(description="Loss of the resulting poses, at the middle level of the search.")
-    generations: int
+    generations: int = Field(description="Generations that the search took.")
     path: Annotated[Literal["near", "wide", "anywhere"], OPEN_WORD] = Field(
         "wide",
         description="`near`: the cameras stand almost as stored, and no search was needed. `wide`: a search around the "
         "stored poses. `anywhere`: some camera was lost and found again, in another direction from its stored "
         "position or, with `search` `anywhere`, elsewhere.",
     )
-    timings_s: dict[str, float]
+    timings_s: dict[str, float] = Field(description=TIMINGS)
     cpu_s: dict[str, float] = CPU_S
     provenance: Provenance
 
@@ -324,155 +327,147 @@ class Result(Schema):
 
 
 class PhotoResult(Schema):
-    """Use of a photo in a lens calibration. `left_out_px`: rms error in it of a lens fitted to the other photos."""
+    """Use of a photo in a lens calibration."""
 
-    name: str
-    fate: Annotated[Literal["used", "no-board", "wrong-size", "hurts"], OPEN_WORD]
-    rms_px: float | None
-    left_out_px: float | None
-    blurred: bool
+    name: str = Field(description="Name of the photo's file.")
+    fate: Annotated[Literal["used", "no-board", "wrong-size", "hurts"], OPEN_WORD] = Field(
+        description="`used`, or why it was not: no board was found, its size differs, or the lens is better without it."
+    )
+    rms_px: float | None = Field(description="Root mean square error of its corners, pixels.")
+    left_out_px: float | None = Field(description="The same with a lens fitted to the other photos.")
+    blurred: bool = Field(description="True if it is less sharp than the others.")
 
 
 class CoverageResult(Schema):
-    """Share of the picture that the board covered; `empty`: the ninths of the picture without any corner."""
+    """Coverage of the picture by the board."""
 
-    share: float
-    empty: list[str]
+    share: float = Field(description="Share 0..1 of the picture that the board covered.")
+    empty: list[str] = Field(description="Ninths of the picture without any corner.")
 
 
 class LensTrial(Schema):
-    """A lens that was tried, with its free parameters (`terms`), its rms in the photos and in left-out photos."""
+    """A lens that was tried."""
 
-    terms: list[str]
-    rms_px: float
-    left_out_px: float
+    terms: list[str] = Field(description="Parameters that were free.")
+    rms_px: float = Field(description="Root mean square error in the photos, pixels.")
+    left_out_px: float = Field(description="The same in photos that were left out of the fit.")
 
 
 class IntrinsicsResult(Schema):
-    """A lens from photos of a board, and its uncertainty.
+    """A lens from photos of a board, and its uncertainty."""
 
-    `sigma`: one standard deviation of each parameter if all corners were independent; `spread`: the same by leaving out
-    photos, which is more realistic. `warnings` say what to photograph next.
-    """
-
-    image_size: list[int]
+    kind: Literal["intrinsics"] = Field("intrinsics", description=KIND)
+    image_size: list[int] = Field(description="Width and height of the photos, pixels.")
     intrinsics: Intrinsics
-    terms: list[str]
-    rms_px: float
-    left_out_px: float
-    sigma: dict[str, float]
-    spread: dict[str, float]
+    terms: list[str] = Field(description="Parameters of the lens that were fitted.")
+    rms_px: float = Field(description="Root mean square error of the corners, pixels.")
+    left_out_px: float = Field(description="The same in photos that were left out of the fit.")
+    sigma: dict[str, float] = Field(description="One standard deviation by parameter, if all corners were independent.")
+    spread: dict[str, float] = Field(description="The same by leaving out photos, which is more realistic.")
     coverage: CoverageResult
-    photos: list[PhotoResult]
-    trials: list[LensTrial]
-    warnings: list[str]
-    timings_s: dict[str, float]
-    software: str
+    photos: list[PhotoResult] = Field(description="Use of each photo.")
+    trials: list[LensTrial] = Field(description="Lenses that were tried.")
+    warnings: list[str] = Field(description="Doubts, and what to photograph next.")
+    timings_s: dict[str, float] = Field(description=TIMINGS)
+    software: str = Field(description="Version of ESC.")
 
 
 class PointResult(Schema):
-    """Check of a clicked point.
+    """Check of a clicked point."""
 
-    `exchanged_with`: the point that it seems to be swapped with. `looks_like`: the named point that it seems to be
-    instead. `residual_px`: null if the camera cannot see the point.
-    """
-
-    world: Landmark | Coordinates
-    residual_px: float | None
-    doubted: bool
-    exchanged_with: Landmark | Coordinates | None
-    looks_like: str | None
+    world: Landmark | Coordinates = Field(description="The point, as it was sent.")
+    residual_px: float | None = Field(
+        description="Distance from the click to the point by the pose, pixels; null if the camera cannot see it."
+    )
+    doubted: bool = Field(description="True if it disagrees with the other points.")
+    exchanged_with: Landmark | Coordinates | None = Field(description="Point that it seems to be swapped with.")
+    looks_like: str | None = Field(description="Named point that it seems to be instead.")
 
 
 class LensGain(Schema):
-    """Parameters of the lens that were fitted to the points, because the given lens does not fit them.
-
-    `left_out_px`: rms error of each point in a fit to the others. `evidence`: gain in BIC; 10 is strong.
-    """
+    """Parameters of the lens that were fitted to the points, because the given lens does not fit them."""
 
     given: Intrinsics
-    free: list[str]
-    sigma: dict[str, float]
-    rms_before_px: float
-    rms_px: float
-    left_out_before_px: float
-    left_out_px: float
-    evidence: float
+    free: list[str] = Field(description="Parameters that were fitted.")
+    sigma: dict[str, float] = Field(description="One standard deviation by parameter.")
+    rms_before_px: float = Field(description="Root mean square error of the points with the given lens, pixels.")
+    rms_px: float = Field(description="The same with the fitted lens.")
+    left_out_before_px: float = Field(
+        description="Root mean square error of each point in a fit to the others, with the given lens."
+    )
+    left_out_px: float = Field(description="The same with the fitted lens.")
+    evidence: float = Field(description="Gain in BIC; 10 is strong.")
 
 
 class LocateSigma(Schema):
-    """One standard deviation of a first pose; `pixels`: of the projected points in the picture."""
+    """One standard deviation of a first pose."""
 
-    rotation_deg: float
-    position_m: float
-    pixels: float
+    rotation_deg: float = Field(description="Of the rotation, degrees.")
+    position_m: float = Field(description="Of the position, m.")
+    pixels: float = Field(description="Of the projected points in the picture, pixels.")
 
 
 class LocateResult(Schema):
-    """A first pose from clicked points. `accepted`: a calibration can start from it, with these `intrinsics`."""
+    """A first pose from clicked points."""
 
-    accepted: bool
-    rejected_because: str | None
-    camera: Id
-    image_size: list[int]
+    kind: Literal["locate"] = Field("locate", description=KIND)
+    accepted: bool = Field(description="True if a calibration can start from the pose, with these `intrinsics`.")
+    rejected_because: str | None = Field(description="Reason in words if it is not accepted.")
+    camera: Id = Field(description="Id of the camera.")
+    image_size: list[int] = Field(description="Width and height of the camera's picture, pixels.")
     intrinsics: Intrinsics
     pose: Pose
-    rms_px: float
+    rms_px: float = Field(description="Root mean square error of the points, pixels.")
     sigma: LocateSigma
-    points: list[PointResult]
+    points: list[PointResult] = Field(description="Check of each point.")
     lens: LensGain | None
-    warnings: list[str]
-    timings_s: dict[str, float]
-    software: str
+    warnings: list[str] = Field(description="Doubts about points and lens.")
+    timings_s: dict[str, float] = Field(description=TIMINGS)
+    software: str = Field(description="Version of ESC.")
 
 
 class MeasureResult(Schema):
-    """A dimension of the pitch, metres: in the venue (`given`), and by the lines (`value` ± `sigma`).
+    """A dimension of the pitch, in the venue and by the lines."""
 
-    `open`: one standard deviation of it before the fit. `known`: true if the lines determine it; if not, `detail` says
-    why, and the fitted field keeps the given value.
-    """
-
-    name: Annotated[Literal["length_m", "width_m", "ridge_height_m", "ridge_length_m"], OPEN_WORD]
-    given: float
-    value: float
-    sigma: float
-    open: float
-    known: bool
-    detail: str
+    name: Annotated[Literal["length_m", "width_m", "ridge_height_m", "ridge_length_m"], OPEN_WORD] = Field(
+        description="Dimension of the field."
+    )
+    given: float = Field(description="Value in the venue, m.")
+    value: float = Field(description="Value by the lines, m.")
+    sigma: float = Field(description="One standard deviation of `value`, m.")
+    open: float = Field(description="One standard deviation before the fit, m.")
+    known: bool = Field(description="True if the lines determine it; if not, the fitted field keeps the given value.")
+    detail: str = Field(description="Why the lines do or do not determine it.")
 
 
 class FieldResult(Schema):
-    """A pitch with the dimensions that its lines determine, and the cameras around it.
+    """A pitch with the dimensions that its lines determine, and the cameras around it."""
 
-    `accepted`: it may replace the venue's field; nothing is replaced automatically.
-    """
-
-    accepted: bool
-    rejected_because: str | None
+    kind: Literal["field"] = Field("field", description=KIND)
+    accepted: bool = Field(description="True if `field` may replace the venue's; nothing is replaced automatically.")
+    rejected_because: str | None = Field(description="Reason in words if it is not accepted.")
     field: FieldOfPlay
-    measures: list[MeasureResult]
-    cameras: list[CameraResult]
-    stitch_error_px: float | None
+    measures: list[MeasureResult] = Field(description="Dimensions, each with its uncertainty.")
+    cameras: list[CameraResult] = Field(description="Cameras, calibrated on `field`.")
+    stitch_error_px: float | None = Field(description="Stitch error on `field`; 1 px is 10 cm on the pitch.")
     warnings: list[str] = Field([], description="Pictures that are missing.")
-    timings_s: dict[str, float]
+    timings_s: dict[str, float] = Field(description=TIMINGS)
     cpu_s: dict[str, float] = CPU_S
     provenance: Provenance
 
 
 class CandidateResult(Schema):
-    """A pose and lens that may have taken the frame.
-
-    `agreement`, 0..1: share of the expected lines that are seen, combined with the share of the seen lines that are
-    expected; `lines_found`: share of the expected lines that are seen; `residual_px`: rms of the measured lines, null
-    if too few were measured.
-    """
+    """A pose and lens that may have taken the frame."""
 
     intrinsics: Intrinsics
     pose: Pose
-    agreement: float
-    lines_found: float
-    residual_px: float | None
+    agreement: float = Field(
+        description="0..1: share of the expected lines that are seen, and of the seen lines that are expected."
+    )
+    lines_found: float = Field(description="Share 0..1 of the expected lines that are seen.")
+    residual_px: float | None = Field(
+        description="Root mean square of the measured lines, pixels; null if too few were measured."
+    )
     sigma: Sigma | None
 
 
@@ -490,12 +485,12 @@ FindReason = Annotated[
 
 
 class FoundCameraResult(Schema):
-    """Result of a search for one camera: `candidates`, the best first. If `accepted`, the first one is the camera."""
+    """Result of a search for one camera."""
 
-    id: Id
-    accepted: bool
+    id: Id = Field(description="Id of the camera.")
+    accepted: bool = Field(description="True if the first candidate is the camera.")
     reason: FindReason | None = Field(description="Reason if it is not accepted, in a word.")
-    rejected_because: str | None
+    rejected_because: str | None = Field(description="Reason in words if it is not accepted.")
     remarks: list[str] = Field(
         description="Assumptions, such as the side of a symmetric field, and doubts about its lens."
     )
@@ -504,27 +499,28 @@ class FoundCameraResult(Schema):
         description="Side of the field that the first candidate stands on, by an assumption about all cameras of the "
         "search. If it is wrong, take the second candidate of each: half a turn about the field's centre away.",
     )
-    image_size: list[int]
-    candidates: list[CandidateResult]
+    image_size: list[int] = Field(description="Width and height of its frame, pixels.")
+    candidates: list[CandidateResult] = Field(description="Candidates, the best first.")
 
 
 class FindResult(Schema):
-    """Cameras found from their frames. `accepted`: all of them were found.
+    """Cameras found from their frames.
 
     Nothing is stored automatically: `POST /venues/{id}/adopt-found` stores the cameras.
     """
 
-    accepted: bool
-    rejected_because: str | None
-    cameras: list[FoundCameraResult]
+    kind: Literal["find"] = Field("find", description=KIND)
+    accepted: bool = Field(description="True if all cameras were found.")
+    rejected_because: str | None = Field(description="Reasons in words for cameras that are not accepted.")
+    cameras: list[FoundCameraResult] = Field(description="Cameras that were searched for.")
     ridge: list[Row] | None = Field(
         None,
         description="Ridge that the lines determine for a field that was given as flat; it is stored with the poses. "
         "Null: none was found, or the field has one.",
     )
-    stitch_error_px: float | None
+    stitch_error_px: float | None = Field(description="Stitch error of the found cameras; 1 px is 10 cm on the pitch.")
     warnings: list[str] = Field([], description="Pictures that are missing.")
-    timings_s: dict[str, float]
+    timings_s: dict[str, float] = Field(description=TIMINGS)
     cpu_s: dict[str, float] = CPU_S
     provenance: Provenance
 
@@ -539,4 +535,8 @@ class FindResult(Schema):
         return {camera: candidates[camera][n - 1] for camera, n in {**first, **choice}.items() if n is not None}
 
 
-AnyResult = Result | IntrinsicsResult | LocateResult | FieldResult | FindResult
+AnyResult = Annotated[
+    Result | IntrinsicsResult | LocateResult | FieldResult | FindResult,
+    Field(discriminator="kind"),
+    OpenChoice("kind", "OtherResult", "Result of a kind of job that later versions add."),
+]

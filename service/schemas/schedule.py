@@ -70,7 +70,7 @@ class Schedule(Schema):
 class ScheduleState(Schema):
     """Next and last run of a venue's schedule."""
 
-    next_at: datetime
+    next_at: datetime = Field(description="Time of the next run.")
     last_at: datetime | None = Field(description="Time of the last run; null: none yet.")
     last_job: str | None = Field(description="Job of the last run; it has failed if there were no frames.")
     last_error: str | None = Field(description="Reason why the last run brought no poses, or is postponed.")

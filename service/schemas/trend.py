@@ -27,26 +27,25 @@ class Anchor(BaseModel):
 class Displacement(Schema):
     """Movement of a camera from its anchor, as a shift of the ground at the farthest marking in the anchor's view.
 
-    For a camera on the long side of a pitch that is the far touchline. Metres on the ground; `across`: to the right in
-    the picture, `away`: along the line of sight. `sigma`: one standard deviation by the pose; `repeatability`: its part
-    that changes from night to night, without errors of the lens and the field.
+    For a camera on the long side of a pitch that is the far touchline. Repeatability leaves out errors of the lens and
+    the field.
     """
 
     anchor: int | None = Field(description="Revision of the anchor; null: the camera had none yet.")
     at: list[float] = Field(description="Point of the pitch at which the shift is given, [x, y] in metres.")
-    across_m: float
-    away_m: float
-    sigma_across_m: float
-    sigma_away_m: float
-    repeatability_across_m: float
-    repeatability_away_m: float
+    across_m: float = Field(description="Shift to the right in the picture, m on the ground.")
+    away_m: float = Field(description="Shift along the line of sight, m on the ground.")
+    sigma_across_m: float = Field(description="One standard deviation of `across_m` by the pose.")
+    sigma_away_m: float = Field(description="One standard deviation of `away_m` by the pose.")
+    repeatability_across_m: float = Field(description="The part of `sigma_across_m` that changes from night to night.")
+    repeatability_away_m: float = Field(description="The part of `sigma_away_m` that changes from night to night.")
     rotation_deg: float = Field(description="Rotation of the camera from its anchor.")
     position_m: float = Field(description="Distance of the camera from its anchor.")
     focal_length: float | None = Field(
         None,
         description="Relative difference of the focal length, by the lines, from the anchor's: 0.001 is 0.1 % more.",
     )
-    sigma_focal_length: float | None = None
+    sigma_focal_length: float | None = Field(None, description="One standard deviation of `focal_length`.")
     focal_length_m: float = Field(
         0.0, description="Shift of the point on the ground per unit of `focal_length`, that is for a doubled one, m."
     )
@@ -68,9 +67,9 @@ class Chart(Schema):
     `away`) or as a share (`focal-length`); `ewma` and the sums are in standard deviations.
     """
 
-    quantity: Annotated[Quantity, OPEN_WORD]
-    value: float
-    mean: float
+    quantity: Annotated[Quantity, OPEN_WORD] = Field(description="Quantity that is watched.")
+    value: float = Field(description="Quantity of that night, relative to the baseline.")
+    mean: float = Field(description="Moving average (EWMA) of `value`.")
     mean_m: float = Field(description="`mean` as a distance at the far touchline, in metres.")
     spread: float = Field(description="Usual standard deviation of `value`.")
     ewma: float = Field(description="Exponentially weighted moving average, weight 0.2.")
@@ -82,27 +81,25 @@ class Chart(Schema):
 
 
 class TrendPoint(Schema):
-    """A night: the mean of its accepted jobs, compared with the anchor.
-
-    `displacement_m` ± `sigma_m`: at the farthest marking in view, on the ground. `focal_length` ± `sigma_focal_length`:
-    relative difference from the anchor's focal length; null if it was not fitted.
-    """
+    """A night: the mean of its accepted jobs, compared with the anchor."""
 
     at: datetime = Field(description="Time at which the last job of the night ended.")
     job: str = Field(description="The last job of the night.")
     jobs: int = Field(description="Number of jobs.")
-    displacement_m: float
-    sigma_m: float
-    across_m: float
-    away_m: float
-    rotation_deg: float
-    sigma_rotation_deg: float | None
-    position_m: float
-    sigma_position_m: float | None
-    focal_length: float | None
-    sigma_focal_length: float | None
+    displacement_m: float = Field(description="Shift of the farthest marking in view, m on the ground.")
+    sigma_m: float = Field(description="One standard deviation of `displacement_m`.")
+    across_m: float = Field(description="Its part to the right in the picture, m.")
+    away_m: float = Field(description="Its part along the line of sight, m.")
+    rotation_deg: float = Field(description="Rotation from the anchor, degrees.")
+    sigma_rotation_deg: float | None = Field(description="One standard deviation of `rotation_deg`.")
+    position_m: float = Field(description="Distance from the anchor, m.")
+    sigma_position_m: float | None = Field(description="One standard deviation of `position_m`.")
+    focal_length: float | None = Field(
+        description="Relative difference from the anchor's focal length; null if it was not fitted."
+    )
+    sigma_focal_length: float | None = Field(description="One standard deviation of `focal_length`.")
     charts: list[Chart] = Field(description="Control charts of the quantities that were measured that night.")
-    state: Annotated[TrendState, OPEN_WORD]
+    state: Annotated[TrendState, OPEN_WORD] = Field(description="State of the charts after that night.")
 
 
 class Trend(Schema):
@@ -128,8 +125,8 @@ class Trend(Schema):
         }
     )
 
-    venue: Id
-    camera: Id
+    venue: Id = Field(description="Id of the venue.")
+    camera: Id = Field(description="Id of the camera.")
     anchor: int | None = Field(
         description="Revision of the anchor; null: no pose was accepted since the camera's pose was set."
     )

@@ -170,8 +170,8 @@ def require_distinct_ids(ids: Sequence[str]) -> None:
 class NamedField(Schema):
     """Id, name and field of a venue."""
 
-    id: Id
-    name: Name = ""
+    id: Id = Field(description="Id of the venue.")
+    name: Name = Field("", description="Name for people.")
     field: FieldOfPlay
 
 
@@ -184,7 +184,7 @@ class Site(NamedField):
 class VenueSettings(NamedField):
     """A venue without the type of its cameras."""
 
-    cameras: list[Any]
+    cameras: list[Any] = Field(description="Cameras around the field.")
     accept: Accept = "each"
     lens: Lens = "fixed"
     recover: Recover = "propose"
@@ -201,7 +201,9 @@ class VenueIn(VenueSettings):
 
     model_config = ConfigDict(json_schema_extra={"examples": [VENUE_EXAMPLE]})
 
-    cameras: Annotated[list[CameraIn], Field(min_length=1, max_length=32)]
+    cameras: Annotated[list[CameraIn], Field(min_length=1, max_length=32)] = Field(
+        description="Cameras around the field."
+    )
     warnings: list[str] = Field(
         [], exclude=True, description="Ignored: so that what answers a PUT can be put again as it is."
     )
@@ -236,7 +238,7 @@ class VenueIn(VenueSettings):
 class Venue(VenueSettings):
     """A venue with its current poses."""
 
-    cameras: list[Camera]
+    cameras: list[Camera] = Field(description="Cameras around the field, with their current poses.")
 
     @property
     def poses(self) -> dict[str, Pose]:
@@ -318,9 +320,9 @@ class ChangedVenue(Venue):
 
     warnings: list[str] = Field(
         [],
-        description="Warnings about poses that do not see the field, with the convention that would explain them; "
-        "about lenses without a `sigma`, without rays for a part of the picture, or of another resolution; and about "
-        "a field of default size without a `sigma`. Not stored: GET does not show them, and PUT ignores them.",
+        description="Warnings about poses that do not see the field, with the convention that would explain them. "
+        "Others are about lenses without a `sigma`, without rays for a part of the picture, or of another resolution, "
+        "and about a field of default size without a `sigma`. Not stored: GET does not show them, PUT ignores them.",
         examples=[
             [
                 "camera west: its lens has no sigma and is taken to be as sure as a good board leaves it, "
@@ -349,21 +351,21 @@ class RestoredVenue(Venue):
 class VenueSummary(Schema):
     """Summary of a venue: name, cameras, active alarms and last calibration."""
 
-    id: Id
-    name: Name
-    cameras: list[Id]
-    scheduled: bool
-    state: Annotated[Literal["ok", "alarm"], OPEN_WORD]
-    alarms: list[Alarm]
+    id: Id = Field(description="Id of the venue.")
+    name: Name = Field(description="Name for people.")
+    cameras: list[Id] = Field(description="Ids of its cameras.")
+    scheduled: bool = Field(description="True if it has a schedule.")
+    state: Annotated[Literal["ok", "alarm"], OPEN_WORD] = Field(description="`alarm` while one of `alarms` is active.")
+    alarms: list[Alarm] = Field(description="Active alarms.")
     last: CalibrationEnd | None = Field(description="Last calibration that ended; null: none yet.")
 
 
 class Venues(Schema):
-    """A page of venues, by id. `next_cursor`: null on the last page."""
+    """A page of venues."""
 
-    venues: list[Venue]
+    venues: list[Venue] = Field(description="Venues, by id.")
     summaries: list[VenueSummary] | None = Field(
         None, exclude_if=is_none, description="Only with `fields=summary`, and then instead of `venues`."
     )
     unreadable: list[Unreadable] = Field([], exclude_if=is_empty, description=UNREADABLE)
-    next_cursor: str | None = None
+    next_cursor: str | None = Field(None, description="`cursor` of the next page; null on the last.")

@@ -1,1 +1,1 @@
-"""Storage: the database, with all SQL of the service, and the files of jobs."""
+"""Storage: the database, with all SQL, and the files of jobs."""

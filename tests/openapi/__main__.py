@@ -6,13 +6,11 @@
 import argparse
 import json
 import sys
-import tempfile
 from pathlib import Path
 from typing import Any
 
-from service.app import create_app
-from service.settings import Settings
 from tests.openapi.comparing import findings
+from tools.openapi import document
 
 HERE = Path(__file__).parent
 # Words for people, which may be put better at any time.
@@ -39,15 +37,6 @@ def main() -> int:
 def last_document() -> Path:
     """Return the file with the OpenAPI document of the last release."""
     return max(HERE.glob("*.json"), key=lambda file: [int(number) for number in file.stem.split(".")])
-
-
-def document() -> dict[str, Any]:
-    """That of a service with the default settings."""
-    with tempfile.TemporaryDirectory(prefix="esc-openapi-") as folder:
-        app = create_app(Settings(data=Path(folder), _env_file=None))
-        made: dict[str, Any] = app.openapi()
-        app.state.context.close()
-    return made
 
 
 def without_words(value: Any, *, names: bool = False) -> Any:

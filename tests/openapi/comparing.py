@@ -153,7 +153,8 @@ def _resolved(document: Document, schema: Document) -> Document:
 
 
 def _alternatives(schema: Document) -> list[Document]:
-    return list(schema.get("anyOf") or schema.get("oneOf") or [schema])
+    choice = schema.get("anyOf") or schema.get("oneOf")
+    return [one for way in choice for one in _alternatives(way)] if choice else [schema]
 
 
 def _types(where: str, before: Document, after: Document, way: Direction) -> Iterator[str]:

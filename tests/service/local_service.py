@@ -1,11 +1,13 @@
 """The service without sockets and processes: for tests that ask what it answers, and not how jobs are run."""
 
 import asyncio
+import re
 
 import httpx
 
 from service.app import create_app
 from service.schemas.job import JobError
+from service.schemas.problems import MEDIA_TYPE
 from service.settings import Settings
 from testbed import program
 from testbed.running import Service
@@ -32,6 +34,30 @@ class ApplicationTransport(httpx.BaseTransport):
         self._loop.close()
 
 
+class ListedProblems:
+    """Fails for a problem that the OpenAPI document does not list for the route that answers it."""
+
+    def __init__(self, app) -> None:
+        self._routes = {
+            (method.upper(), re.sub(r"\\{\w+\\}", "[^/]+", re.escape(path))): operation["responses"]
+            for path, operations in app.openapi()["paths"].items()
+            for method, operation in operations.items()
+        }
+
+    def check(self, answer: httpx.Response) -> None:
+        if answer.headers.get("content-type") != MEDIA_TYPE or answer.request.method == "HEAD":
+            return
+        answer.read()
+        kind, status = answer.json()["type"], str(answer.status_code)
+        # A fault of the service can be anywhere.
+        if kind == "/problems/internal-error":
+            return
+        for (method, path), responses in self._routes.items():
+            if method == answer.request.method and re.fullmatch(path, answer.request.url.path):
+                listed = responses.get(status, {}).get("x-problem-types", [])
+                assert kind in listed, f"{method} {answer.request.url.path} answers {status} {kind}, not in {listed}"
+
+
 class LocalService(Service):
     """The application in this process. A job is computed, by the stub of the engine, when a test asks for its end."""
 
@@ -41,7 +67,10 @@ class LocalService(Service):
         app = create_app(settings)
         self.context = app.state.context
         self.url = "http://localhost"
-        self.http = httpx.Client(base_url=self.url, transport=ApplicationTransport(app))
+        listed = ListedProblems(app)
+        self.http = httpx.Client(
+            base_url=self.url, transport=ApplicationTransport(app), event_hooks={"response": [listed.check]}
+        )
         self.ask = self.http.request
 
     def __enter__(self) -> "LocalService":

@@ -1,4 +1,4 @@
-"""The engine on one page: frames and stored poses in; new poses, verdicts and diagnostics out."""
+"""The engine on one page: frames and stored poses in, new poses and verdicts out."""
 
 from __future__ import annotations
 
@@ -173,7 +173,7 @@ def remember(
 
     That of a camera that was knocked begins anew, where it was found.
     """
-    lines = judged.pitch.line_points()
+    lines = judged.pitch.measured_points
     after = {}
     for before, result in zip(stored, judged.cameras, strict=True):
         if not result.accepted or result.measured is None:

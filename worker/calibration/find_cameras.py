@@ -1,4 +1,4 @@
-"""The engine's other page: frames without poses in; the cameras that took them out, each with a verdict."""
+"""The engine's other page: frames without poses in, cameras with verdicts out."""
 
 from __future__ import annotations
 
@@ -25,6 +25,7 @@ from worker.calibration.relocalisation.candidate import Candidate
 from worker.calibration.relocalisation.crown import find_crown
 from worker.calibration.relocalisation.field_halves import choose_sides, side_of
 from worker.calibration.relocalisation.field_map import FieldMap
+from worker.calibration.relocalisation.field_paint import draw_field_paint
 from worker.calibration.relocalisation.relocalise import NotFound, Relocalisation, relocalise, twin
 from worker.calibration.relocalisation.rivals import tell_rivals_apart
 from worker.calibration.relocalisation.shared_ground import SharedGround
@@ -116,7 +117,11 @@ def find_cameras(
         for number, one in enumerate(sought):
             fraction = SEGMENTED + (SEARCHED - SEGMENTED) * number / len(sought)
             progress.at_fraction("evolution", fraction, remaining_s=pace.remaining_s(number, sought[number:]))
-            alone[one.id] = relocalise(pitch, markings, one, *seen[one.id], seed)
+            in_one_paint = _InOnePaint(pitch, markings, one, frames[one.id][0], segment, seed)
+            alone[one.id] = relocalise(
+                pitch, markings, one, *seen[one.id], seed, in_another_way=in_one_paint.relocalise
+            )
+            seen[one.id] = in_one_paint.seen or seen[one.id]
         for helped in _with_lenses_of_others(sought, alone):
             progress.at_fraction("evolution", SEARCHED)
             again = relocalise(pitch, markings, helped, *seen[helped.id], seed)
@@ -190,6 +195,39 @@ def _seen(
     """Return the channels of a camera's frames and the fused response (H, W) in 0..1, 0 where they are ignored."""
     swayed = sways(frames, sought.lenses[0].lens)
     return Channels(frames, swayed), of_use(sought.ignored, median(responses, swayed) / np.float32(255))
+
+
+@dataclass
+class _InOnePaint:
+    """Search for a camera by the paint alone that is most likely the field's.
+
+    `seen`: channels and response (H, W) of the frame in that paint, once the camera was found in it.
+    """
+
+    pitch: Field
+    markings: FieldMap
+    sought: SoughtCamera
+    frame: Frame
+    segment: Segment
+    seed: int
+    seen: tuple[Channels, NDArray[np.float32]] | None = None
+
+    def relocalise(self, in_all: Relocalisation) -> Relocalisation | None:
+        """Find the camera, or say why not; None unless its lines agree better with one paint than `in_all` colours."""
+        painted = draw_field_paint(self.markings, self.sought, self.frame, self.segment, self.seed)
+        if painted is None:
+            return None
+        seen = _seen(self.sought, [painted], [self.segment(painted, whole_frame(self.sought.size))])
+        found = relocalise(self.pitch, self.markings, self.sought, *seen, self.seed)
+        if _best_agreement(found) <= _best_agreement(in_all):
+            return None
+        self.seen = seen
+        remark = "the lines of one colour alone were taken for the field's, others for those of other sports"
+        return replace(found, remarks=[*found.remarks, remark])
+
+
+def _best_agreement(found: Relocalisation) -> float:
+    return max((candidate.agreement for candidate in found.candidates), default=0.0)
 
 
 def _with_lenses_of_others(
@@ -286,7 +324,7 @@ def why_not_confirmed(result: CameraResult, *, is_lens_found: bool) -> str | Non
     if is_lens_found and result.residual_px is not None and result.residual_px > most_px:
         return (
             f"lines are {result.residual_px:.2f} px from where pose and lens put them, at most {most_px:.2f} allowed "
-            "through a lens that was found with the pose; are the measures of the field quite right? Say what the "
+            "through a lens that was found with the pose; are the measures of the field right? Say what the "
             "lens is, if it is known"
         )
     return None

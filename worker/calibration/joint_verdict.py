@@ -1,4 +1,4 @@
-"""The joint verdict: cameras of a venue that passed the gate by themselves, judged against each other."""
+"""The joint verdict: cameras that passed the gate, judged against each other."""
 
 from __future__ import annotations
 

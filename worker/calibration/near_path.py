@@ -1,4 +1,4 @@
-"""The near path: cameras that stand almost at their stored poses are refined from there without a search.
+"""The near path: cameras near their stored poses are refined without a search.
 
 The refinement catches lines that are a few pixels from where stored poses expect them, and ends where it ends after a
 search. What it finds has to pass the same gate. That is asked camera by camera: one that was turned is searched for,

@@ -1,4 +1,4 @@
-"""Observation: what the frames of a calibration show, and when the network looks at them.
+"""Observation: what the frames show, and when the network looks at them.
 
 The near path needs no network: lines are measured in the frames themselves. It stays a witness of every job, at what a
 witness costs: an overview of each frame, which must not show that most of the lines on the pitch are elsewhere. It

@@ -1,4 +1,4 @@
-"""The paint path: on a floor of several sports, the lines of one field are told from the others by their colour.
+"""The paint path: lines of several sports are told apart by their colour.
 
 Which paint is the field's is one unknown that all its lines and all cameras share. Where most of what looks like a
 line on the field is none of its lines, each colour on the floor is taken for the field's, and the cameras are placed by
@@ -16,7 +16,8 @@ from functools import cached_property
 
 import numpy as np
 
-from worker.calibration.detection.paint import sort_colours
+from worker.calibration.detection.paint import COMPARED_WIDTH_PX, sort_colours
+from worker.calibration.detection.segmentation import covered
 from worker.calibration.diagnostics.overlap import Overlap, overlap_of
 from worker.calibration.gate.confidence import logit
 from worker.calibration.gate.quality import MUCH_UNEXPECTED, Moved
@@ -30,9 +31,6 @@ from worker.calibration.refinement.least_squares import CLUSTER_POINTS
 from worker.calibration.refinement.priors import MOVED_M, MOVED_RAD
 from worker.calibration.steps import network_responses, search_poses
 
-COMPARED_WIDTH_PX = 1280
-"""Width of the frames in which colours are compared. Lines are wide enough to show their paint, and which is the
-field's is seen in overviews."""
 SURE_NATS = float(np.log(1000))
 """By how much the odds of a colour have to be better than those of any other."""
 
@@ -93,7 +91,8 @@ def show_paint_of_field(
     others. `locate` places the cameras by what each paint shows."""
     small = observer.reduced(COMPARED_WIDTH_PX)
     first = [small.frames[small.cameras[n].id][0] for n in problem.usable]
-    colours = sort_colours(first, [small.regions_of_lines(small.cameras[n]) for n in problem.usable])
+    reachable = [small.regions_of_lines(small.cameras[n]) for n in problem.usable]
+    colours = sort_colours(first, [covered(its, frame.shape) for its, frame in zip(reachable, first, strict=True)])
     reduced = replace(problem, cameras=small.cameras)
     shown = small.in_colours(colours, [[n] for n in range(len(colours))])
     explained = [_explain(one, reduced, locate, progress) for one in shown]

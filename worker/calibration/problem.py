@@ -1,4 +1,4 @@
-"""The problem of a calibration and its solution: what the stages of the engine hand to each other."""
+"""The problem of a calibration and its solution."""
 
 from __future__ import annotations
 

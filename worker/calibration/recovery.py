@@ -1,4 +1,4 @@
-"""Recovery of knocked cameras: those whose lines are clearly seen, and not where the stored poses expect them.
+"""Recovery of knocked cameras, whose lines are seen elsewhere than expected.
 
 Such a camera is searched for where it stood, turned on its mount by any angle; and if that finds nothing and the
 calibration was asked to, anywhere. What is found is refined and judged with the other cameras, as if it had been

@@ -14,6 +14,9 @@ HUBER, TUKEY = 1.345, 4.685
 USUAL = 1 / 1.4826
 """Median absolute value of normal errors, in standard deviations."""
 
+SURE = 3.0
+"""Standard deviations from which a difference is no chance."""
+
 Weigh = Callable[[Array], Array]
 """Function from M residuals, in units of their expected errors, to their weights (M,)."""
 

@@ -1,4 +1,6 @@
-"""Solving for the poses of all cameras: where they stood, then around it, in all colours or in the paint of a field.
+"""Solving for the poses of all cameras: near path first, then wide.
+
+In all colours, or in the paint of one field.
 
 The cheapest explanation comes first, and the first one that the gate accepts for all cameras is the answer.
 """

@@ -1,4 +1,4 @@
-"""The steps of a calibration: search, joint refinement, and the judgement of each camera by itself."""
+"""Steps of a calibration: search, joint refinement, judgement of each camera."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Frames that came from another camera of the venue than the one they were sent for: exchanged cables or addresses.
+"""Frames that came from another camera of the venue: exchanged cables or addresses.
 
 Asked only of cameras whose lines are not seen where their stored poses put them. Such a frame is another camera's
 if it passes the gate at that camera's stored pose with that camera's lens, as a frame of its own would.
@@ -14,13 +14,12 @@ from worker.calibration.gate.quality import CameraResult
 from worker.calibration.geometry.camera import Camera, Frame
 from worker.calibration.problem import ObservedCameras, Problem
 from worker.calibration.records import NOT_RECORDED, ProgressReporter
+from worker.calibration.robust import SURE
 from worker.calibration.steps import best_attempt, ridge_responses, search_poses, single_camera_problem
 
 MOST_OF_ITS_OWN, LEAST_OF_ANOTHER = 0.3, 0.6
 """Share of the expected places at which a line is seen: a frame of which its own camera has more is not asked about,
 and one of which another camera has less is not tried there."""
-NEARER_BY_SIGMAS = 3.0
-"""A camera that was turned until it sees what its neighbour sees still stands in its own place."""
 
 
 def mark_swapped_frames(
@@ -84,10 +83,13 @@ def _result_as(
 
 
 def _stands_nearer(result: CameraResult, own: Camera, other: Camera) -> bool:
-    """True if a camera that was found from the other one's pose stands nearer to its own stored place."""
+    """True if a camera that was found from the other one's pose surely stands nearer to its own stored place.
+
+    One that was turned until it sees what its neighbour sees still stands in its own.
+    """
     to_own, to_other = map(result.camera.distance_m, (own, other))
     sigma = 0.0 if result.sigma is None else result.sigma.position_m
-    return to_own + NEARER_BY_SIGMAS * sigma < to_other
+    return to_own + SURE * sigma < to_other
 
 
 def _words(other: str, share: float, own_share: float, *, mutual: bool) -> str:

@@ -1,4 +1,4 @@
-"""The wide path: cameras that are not near their stored poses are searched for, and all are refined together.
+"""The wide path: other cameras are searched for, and all are refined.
 
 They are searched for in overviews of their frames first, and refined by lines alone; where all pass the gate so, the
 network need not look in full. Else it has to, and a bad camera drags no other along: a camera that fails the gate is

@@ -1,4 +1,4 @@
-"""Refit of cameras whose zoom or focus has moved: focal length and pose together, from the lines.
+"""Refit of cameras whose zoom or focus has moved.
 
 Where lines and movement contradict the focal length beyond doubt, the pose that was found with it is wrong, and a
 better one is known. Whether that may be stored is the venue's choice: a lens that was screwed tight has not moved, and

@@ -1,1 +1,1 @@
-"""The duties of a worker beside its jobs: webhook delivery, retention, timed alarms and schedules."""
+"""Duties of a worker beside its jobs: webhooks, retention, alarms, schedules."""

@@ -94,7 +94,7 @@ class WebhookDelivery:
             **_names(delivery, event), receiver=delivery.receiver, attempt=delivery.attempt
         ):
             if event is None:
-                self._give_up(delivery, f"the {unreadable}" if unreadable else "what was to be told is no longer kept")
+                self._give_up(delivery, f"the {unreadable}" if unreadable else "the event is no longer kept")
                 return
             try:
                 answer = self._send(delivery, event.model_dump_json().encode())

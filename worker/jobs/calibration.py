@@ -176,6 +176,7 @@ def _result(
         )
 
     return Result(
+        kind="calibration",
         verdict=found.verdict,
         accepted=found.accepted,
         rejected_because=found.rejected_because,
@@ -226,7 +227,7 @@ def _adoptable(venue: Venue, found: engine.Calibration) -> list[AdoptableNumber]
 
 def _nights(pitch: Field, memory: CameraMemory | None) -> int:
     """Return the number of jobs in a memory, 0 if it is of another field."""
-    (fits,) = memories_of_field([memory], pitch.line_points())
+    (fits,) = memories_of_field([memory], pitch.measured_points)
     return 0 if fits is None else fits.jobs
 
 

@@ -103,7 +103,7 @@ class DebugRecorder(Recorder):
         name, frame, on_ground = after.id, self._frames[after.id], measured.points.position
         offset_before, offset = (measured.offset(camera, on_ground) for camera in (before, after))
         weight = measured.trust * np.minimum(tukey_weights(offset / measured.sigma_px), 1.0)
-        height = on_ground[:, 2] - pitch.line_points().position[measured.index, 2]
+        height = on_ground[:, 2] - pitch.measured_points.position[measured.index, 2]
         columns = {
             "marking": measured.points.marking,
             "position_m": np.round(on_ground, 4),

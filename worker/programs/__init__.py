@@ -1,1 +1,1 @@
-"""Programs that the service asks for something at once, without a job."""
+"""Programs that the service runs at once, without a job."""

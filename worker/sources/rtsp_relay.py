@@ -182,7 +182,7 @@ class _Talk:
             elif said.is_response:
                 await self._answered(said)
             elif said.method == "REDIRECT":
-                raise CameraError(redirect_in_words(said, "it told the service to go on"))
+                raise CameraError(redirect_in_words(said, "it sent the service on"))
 
     async def ask(self, request: Message) -> None:
         """Send a request of FFmpeg's to the camera."""

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.detection.contrast import LUMA, LUMA_SHARES
+from worker.calibration.detection.contrast import LUMA_SHARES, Channel
 from worker.calibration.detection.sampling import read_bytes
 from worker.calibration.geometry.camera import Array, Frame
 
@@ -90,7 +90,7 @@ class Picture:
         """
         luma, blue, red = self.planes
         brightness = read_bytes(luma, column, row)
-        if channel == LUMA:
+        if channel == Channel.LUMA:
             brightness = (brightness - BLACK) * np.float32(255 / LUMA_LEVELS)
         else:
             by_luma, by_blue, by_red, constant = FROM_PLANES[channel].astype(np.float32)

@@ -37,6 +37,9 @@ DOCUMENTS: dict[int | str, dict[str, Any]] = {
 }
 
 
+FormatQuery = Annotated[FormatName, Query(alias="format", description="Format of the document.")]
+
+
 @dataclass(frozen=True)
 class ExportQuery:
     """Query of an export: the camera, the lens, and the entity tag that the caller has."""

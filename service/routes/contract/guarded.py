@@ -13,7 +13,7 @@ from service.api.body_limit import is_form
 from service.api.problems import not_json
 from service.routes.contract import restricted
 from service.routes.contract.attribution import caller_key
-from service.routes.contract.documented import KEY_SCHEME, problem_responses
+from service.routes.contract.documented import KEY_SCHEME
 from service.schemas.names import Scope
 
 
@@ -29,8 +29,6 @@ class Guarded(APIRoute):
         if security is None:
             raise TypeError(f"{path} must say who may call it: openapi_extra=needs_scope(...) or =FOR_ALL")
         self.needed: Scope | None = security[0][KEY_SCHEME][0] if security else None
-        if self.needed:
-            rest["responses"] = {**problem_responses(401, 403, 421, 429), **(rest.get("responses") or {})}
         super().__init__(path, endpoint, **rest)
 
     def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:

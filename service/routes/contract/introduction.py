@@ -5,8 +5,8 @@ from __future__ import annotations
 DESCRIPTION = """\
 Frames of fixed cameras around a sports field go in, their poses come out.
 
-**World:** right-handed, in metres. The origin is the centre of the field on the ground, x runs along `length_m` (to the
-right as seen from the cameras' usual side, where y < 0), y across the field away from that side, z up.
+**World:** right-handed, in metres. The origin is the centre of the field on the ground. x runs along `length_m`, to the
+right as seen from the cameras' usual side, where y < 0. y runs across the field away from that side, z up.
 
 **Cameras** are OpenCV's: x right, y down, z forward, pixel centres at integers. `rotation` is a Rodrigues vector (rad)
 from world to camera, `position` the camera's centre in the world, `translation` = -R·position is OpenCV's `tvec`.

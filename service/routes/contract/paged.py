@@ -7,6 +7,8 @@ from urllib.parse import urlencode
 
 from fastapi import Request
 
+LIMIT = "Most entries of a page."
+CURSOR = "`next_cursor` of the page before; absent: the first page."
 # `headers` of an entry for `responses=`; the last page has none.
 NEXT_PAGE: dict[str, Any] = {
     "Link": {"description": 'The next page, `rel="next"` (RFC 8288).', "schema": {"type": "string"}}

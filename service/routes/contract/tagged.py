@@ -10,7 +10,9 @@ from fastapi import Header, Response
 from service.routes.contract.documented import header_docs
 from service.schemas import etags
 
-IfNoneMatch = Annotated[str | None, Header()]
+IfNoneMatch = Annotated[
+    str | None, Header(description="`ETag` of the answer that the client has: 304 if it is the same.")
+]
 # Entries for `responses=`.
 TAGGED: dict[int | str, dict[str, Any]] = {
     200: header_docs("ETag"),

@@ -12,11 +12,11 @@ from service.api.context import Context, InContext, VenueIdPath
 from service.routes.contract.documented import (
     form_body,
     needs_scope,
-    problem_responses,
-    schema_reference,
+    sent_reference,
     submission_responses,
 )
 from service.routes.contract.guarded import Guarded
+from service.routes.contract.problem_docs import OF_FRAMES, problem_responses
 from service.routes.submissions import forms, job_submission
 from service.routes.submissions.job_submission import FromSender, Sender
 from service.schemas.find import SoughtSite
@@ -37,7 +37,7 @@ UPLOAD = form_body(
     "A JPEG or PNG file per camera that is to be found, the part named by the camera's id; repeat a part to send "
     "several frames of a camera. Frames of the other cameras help. Of a venue that is not stored yet, `site` says "
     "what it is.",
-    parts={SITE_PART: schema_reference(SoughtSite)},
+    parts={SITE_PART: sent_reference(SoughtSite)},
 )
 UPLOAD["requestBody"]["content"]["multipart/form-data"]["encoding"][SITE_PART] = {"contentType": "application/json"}
 
@@ -46,10 +46,15 @@ UPLOAD["requestBody"]["content"]["multipart/form-data"]["encoding"][SITE_PART] =
     "/venues/{venue_id}/find",
     status_code=202,
     response_model=Job,
-    responses=submission_responses() | problem_responses(400, 404, 408, 409, 413, 415, 422, 429, 507),
+    responses=submission_responses()
+    | problem_responses(
+        *OF_FRAMES, "site-missing", "nothing-to-find", "venue-id-mismatch", "venue-stored", "no-such-camera"
+    ),
     openapi_extra=UPLOAD | needs_scope("calibrate"),
 )
-async def find(venue_id: VenueIdPath, request: Request, context: InContext, sender: FromSender) -> Response:
+async def submit_camera_search(
+    venue_id: VenueIdPath, request: Request, context: InContext, sender: FromSender
+) -> Response:
     """Find cameras from their frames and the field alone: those of a stored venue, or of a new one.
 
     `site` describes a new venue; a stored one needs none.

@@ -7,8 +7,9 @@ from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import FormData
 
 from service.api.context import Context, InContext, VenueIdPath
-from service.routes.contract.documented import frames_form_body, needs_scope, problem_responses, submission_responses
+from service.routes.contract.documented import frames_form_body, needs_scope, submission_responses
 from service.routes.contract.guarded import Guarded
+from service.routes.contract.problem_docs import OF_FRAMES, OF_SOURCES, problem_responses
 from service.routes.submissions import forms, job_submission
 from service.routes.submissions.job_submission import FromSender, Sender
 from service.schemas.job import Job
@@ -23,10 +24,12 @@ router = APIRouter(tags=["jobs"], route_class=Guarded)
     "/venues/{venue_id}/calibrate",
     status_code=202,
     response_model=Job,
-    responses=submission_responses() | problem_responses(400, 404, 408, 409, 413, 415, 422, 429, 502, 507),
+    responses=submission_responses() | problem_responses(*OF_FRAMES, *OF_SOURCES, "venue-busy"),
     openapi_extra=frames_form_body(Options, required=False) | needs_scope("calibrate"),
 )
-async def calibrate(venue_id: VenueIdPath, request: Request, context: InContext, sender: FromSender) -> Response:
+async def submit_calibration(
+    venue_id: VenueIdPath, request: Request, context: InContext, sender: FromSender
+) -> Response:
     """Submit a frame (or several) per camera, or none at all. Follow the job at `Location`.
 
     Without frames (no body, or a form with `options` alone) the service fetches one from the source of each camera.
@@ -41,10 +44,10 @@ async def calibrate(venue_id: VenueIdPath, request: Request, context: InContext,
     "/venues/{venue_id}/field/fit",
     status_code=202,
     response_model=Job,
-    responses=submission_responses() | problem_responses(400, 404, 408, 409, 413, 415, 422, 429, 507),
+    responses=submission_responses() | problem_responses(*OF_FRAMES),
     openapi_extra=frames_form_body(FieldOptions) | needs_scope("calibrate"),
 )
-async def fit_field(venue_id: VenueIdPath, request: Request, context: InContext, sender: FromSender) -> Response:
+async def submit_field_fit(venue_id: VenueIdPath, request: Request, context: InContext, sender: FromSender) -> Response:
     """Fit length, width and ridge of the pitch to the frames of all cameras. The stored venue stays as it is.
 
     The result has each measure with its sigma, says which the frames cannot tell and why, and has a `field` to be put

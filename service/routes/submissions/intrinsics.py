@@ -9,8 +9,9 @@ from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import FormData, UploadFile
 
 from service.api.context import Context, InContext
-from service.routes.contract.documented import FILE, form_body, needs_scope, problem_responses, submission_responses
+from service.routes.contract.documented import FILE, form_body, needs_scope, submission_responses
 from service.routes.contract.guarded import Guarded
+from service.routes.contract.problem_docs import OF_UPLOADS, problem_responses
 from service.routes.submissions import forms, job_submission
 from service.routes.submissions.job_submission import FromSender, Sender
 from service.schemas.job import Job
@@ -34,10 +35,10 @@ UPLOAD = form_body(
     "/intrinsics",
     status_code=202,
     response_model=Job,
-    responses=submission_responses() | problem_responses(400, 408, 413, 415, 422, 429, 507),
+    responses=submission_responses() | problem_responses(*OF_UPLOADS, "missing-photos", "too-many-photos"),
     openapi_extra=UPLOAD | needs_scope("calibrate"),
 )
-async def intrinsics(
+async def submit_lens_calibration(
     request: Request,
     context: InContext,
     sender: FromSender,

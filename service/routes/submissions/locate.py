@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from fastapi import APIRouter, Path, Query, Request, Response
+from fastapi import APIRouter, Query, Request, Response
 from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import FormData, UploadFile
 
-from service.api.context import Context, InContext, VenueIdPath
-from service.routes.contract.documented import form_body, needs_scope, problem_responses, submission_responses
+from service.api.context import CameraIdPath, Context, InContext, VenueIdPath
+from service.routes.contract.documented import form_body, needs_scope, submission_responses
 from service.routes.contract.guarded import Guarded
+from service.routes.contract.problem_docs import OF_FRAMES, problem_responses
 from service.routes.jobs import job_response, wait_for_end
 from service.routes.submissions import forms, job_submission
 from service.routes.submissions.job_submission import FromSender, Sender
 from service.schemas.job import Job
-from service.schemas.names import ID_PATTERN, OPTIONS_PART
+from service.schemas.names import OPTIONS_PART
 from service.schemas.options import LocateOptions
 from service.schemas.problems import Problem
 from service.schemas.venue import Camera, Venue
@@ -36,12 +37,12 @@ UPLOAD = form_body(
     status_code=202,
     response_model=Job,
     responses=submission_responses("The job has ended, or this content is already a job")
-    | problem_responses(400, 404, 408, 409, 413, 415, 422, 429, 507),
+    | problem_responses(*OF_FRAMES),
     openapi_extra=UPLOAD | needs_scope("calibrate"),
 )
-async def locate(
+async def submit_first_pose(
     venue_id: VenueIdPath,
-    camera: Annotated[str, Path(pattern=ID_PATTERN)],
+    camera: CameraIdPath,
     request: Request,
     context: InContext,
     sender: FromSender,

@@ -7,8 +7,9 @@ import hashlib
 from fastapi import APIRouter, Request, Response
 
 from service.api.context import Context, InContext
-from service.routes.contract.documented import needs_scope, problem_responses, submission_responses
+from service.routes.contract.documented import needs_scope, submission_responses
 from service.routes.contract.guarded import Guarded
+from service.routes.contract.problem_docs import problem_responses
 from service.routes.jobs import ExistingJob
 from service.routes.submissions import forms, job_submission
 from service.schemas.job import Job
@@ -21,6 +22,16 @@ from service.store.jobs.submission import Submission
 from service.store.jobs.task import Origin, UnreadableJob, seeded
 from service.store.refusals import no_such_venue
 
+OF_COPIES = (
+    "frames-deleted",
+    "job-of-newer-version",
+    "venue-not-found",
+    "venue-replaced",
+    "venue-stored",
+    "venue-busy",
+    "queue-full",
+    "disk-full",
+)
 router = APIRouter(prefix="/jobs", tags=["jobs"], route_class=Guarded)
 
 
@@ -29,9 +40,9 @@ router = APIRouter(prefix="/jobs", tags=["jobs"], route_class=Guarded)
     status_code=202,
     response_model=Job,
     openapi_extra=needs_scope("calibrate"),
-    responses=submission_responses("It is being computed") | problem_responses(404, 409, 410, 507),
+    responses=submission_responses("It is being computed") | problem_responses(*OF_COPIES),
 )
-def submit_again(job: ExistingJob, request: Request, context: InContext) -> Response:
+def resubmit_job(job: ExistingJob, request: Request, context: InContext) -> Response:
     """Submit the frames of a job again, with its options, as long as its frames are kept."""
     return submit(context, job, request.state.origin)
 
@@ -41,9 +52,10 @@ def submit_again(job: ExistingJob, request: Request, context: InContext) -> Resp
     status_code=202,
     response_model=Job,
     openapi_extra=needs_scope("calibrate"),
-    responses=submission_responses("It is being computed") | problem_responses(404, 409, 410, 422, 507),
+    responses=submission_responses("It is being computed")
+    | problem_responses(*OF_COPIES, "poses-not-found", "missing-camera"),
 )
-def calibrate_found(job: ExistingJob, request: Request, context: InContext) -> Response:
+def calibrate_found_cameras(job: ExistingJob, request: Request, context: InContext) -> Response:
     """Calibrate a venue with the frames of a search for its cameras, once what was found is stored.
 
     `POST /venues/{id}/adopt-found` stores it. The calibration has the default options and begins with the poses that

@@ -9,10 +9,10 @@ from typing import Annotated, Literal, get_args
 from pydantic import Field
 
 from service.schemas.actor import Attributed
-from service.schemas.base import OPEN_WORD, Id, Schema
+from service.schemas.base import OPEN_WORD, Id, OpenChoice, Schema
 from service.schemas.geometry import PosedCamera, Row
 from service.schemas.health import AlarmEvent
-from service.schemas.history import Cause
+from service.schemas.history import CAUSES, Cause
 from service.schemas.job import JobEvent
 from service.schemas.names import EventKind
 
@@ -23,22 +23,24 @@ FINAL_EVENT = "venue.deleted"
 class Poses(Schema):
     """Current poses and lenses of a venue's cameras: all that is needed to draw on their pictures."""
 
-    venue: Id
+    venue: Id = Field(description="Id of the venue.")
     revision: int = Field(description="Revision in the history of the venue; the highest one is current.")
-    cause: Annotated[Cause, OPEN_WORD]
+    cause: Annotated[Cause, OPEN_WORD] = Field(description=f"Cause of the revision: {CAUSES}")
     job: str | None = Field(
         description="Job that found these poses; for a restored revision, the job whose poses were rejected by hand."
     )
-    stitch_error_px: float | None
-    ridge: list[Row] | None
-    cameras: list[PosedCamera]
+    stitch_error_px: float | None = Field(description="Stitch error by the job; null: not measured.")
+    ridge: list[Row] | None = Field(description="Ridge that the poses belong to, as in the field; null: flat.")
+    cameras: list[PosedCamera] = Field(description="Cameras with lenses and poses.")
     changed: list[Id] = Field(description="Cameras whose pose or lens differs from the previous revision.")
 
 
 class PosesEvent(Attributed):
     """New poses by a calibration, by hand or by PUT (`poses.changed`); first event of a stream (`poses.current`)."""
 
-    type: Literal["poses.changed", "poses.current"]
+    type: Literal["poses.changed", "poses.current"] = Field(
+        description="`poses.changed`; `poses.current`: the first event of a stream."
+    )
     timestamp: datetime = Field(description="Time since which the poses are current.")
     data: Poses
 
@@ -46,19 +48,25 @@ class PosesEvent(Attributed):
 class VenueChange(Schema):
     """A venue that was created, changed or deleted."""
 
-    venue: Id
+    venue: Id = Field(description="Id of the venue.")
     changed: list[str] = Field(description="Fields of the venue that PUT or PATCH changed.")
 
 
 class VenueEvent(Attributed):
     """Event of a venue that was created, changed or deleted."""
 
-    type: Literal["venue.created", "venue.changed", "venue.deleted"]
-    timestamp: datetime
+    type: Literal["venue.created", "venue.changed", "venue.deleted"] = Field(
+        description="`venue.created`, `venue.changed` or `venue.deleted`, after which no event follows."
+    )
+    timestamp: datetime = Field(description="Time of the change.")
     data: VenueChange
 
 
-Event = Annotated[PosesEvent | VenueEvent | JobEvent | AlarmEvent, Field(discriminator="type")]
+Event = Annotated[
+    PosesEvent | VenueEvent | JobEvent | AlarmEvent,
+    Field(discriminator="type"),
+    OpenChoice("type", "OtherEvent", "Event that later versions add: ignore it."),
+]
 EVENT_MODELS: tuple[type[Attributed], ...] = get_args(get_args(Event)[0])
 # Clients skip other types, of newer versions.
 EVENT_TYPES = frozenset(word for event in EVENT_MODELS for word in get_args(event.model_fields["type"].annotation))

@@ -18,7 +18,7 @@ class Webhook(Schema):
 
     model_config = ConfigDict(json_schema_extra={"examples": [WEBHOOK_EXAMPLE]})
 
-    url: CallbackUrl
+    url: CallbackUrl = Field(description="Address that gets the events; answers show it without its path.")
     events: Annotated[list[Annotated[EventKind, OPEN_WORD]], Field(min_length=1, max_length=len(EVENT_KINDS))] = Field(
-        ["poses.changed"]
+        ["poses.changed"], description="Kinds of events that it gets."
     )

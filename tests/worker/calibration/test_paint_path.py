@@ -7,15 +7,19 @@ import pytest
 
 from fields.template import load
 from models import MODEL_PATH
-from testbed.synthetic import GRASS, PAINTS, camera, moved, paint_markings
+from testbed.synthetic import GRASS, PAINTS, camera, moved, paint_frame, paint_markings
 from worker.calibration import solve
 from worker.calibration.calibrate import calibrate
 from worker.calibration.detection.segmentation import Segmenter
+from worker.calibration.find_cameras import find_cameras
 from worker.calibration.gate.quality import Moved
 from worker.calibration.geometry.field import Field
 from worker.calibration.paint_path import log_odds
 from worker.calibration.problem import Problem
 from worker.calibration.records import Options
+from worker.calibration.relocalisation.field_map import FieldMap
+from worker.calibration.relocalisation.field_paint import draw_field_paint
+from worker.calibration.relocalisation.sought import SoughtCamera, SoughtLens
 
 pytestmark = pytest.mark.slow
 
@@ -91,3 +95,29 @@ def test_without_their_colour_the_pose_is_drawn_to_lines_of_the_others(monkeypat
     options = Options(recover="never")
     result = calibrate(NETBALL, [STORED], {"hall": [frame()]}, Segmenter(MODEL_PATH, 1), options).cameras[0]
     assert off_px(result) > 1.5
+
+
+SOUGHT = SoughtCamera("hall", [SoughtLens.known(CAMERA.intrinsics)])
+
+
+@pytest.mark.long
+def test_a_camera_without_a_pose_is_found_by_the_lines_of_its_own_sport():
+    found = find_cameras(NETBALL, [SOUGHT], [], {"hall": [frame()]}, Segmenter(MODEL_PATH, 1), 0).cameras[0]
+    assert found.accepted, found.refusal
+    assert "one colour alone" in found.remarks[0]
+    best, other = (candidate.camera for candidate in found.candidates[:2])
+    # Which side of a symmetric court it stands on is assumed.
+    assert min(best.distance_m(CAMERA), other.distance_m(CAMERA)) < 0.03
+
+
+def test_without_a_pose_the_paint_of_the_field_is_the_one_whose_lines_a_camera_explains():
+    drawn = draw_field_paint(FieldMap.of(NETBALL), SOUGHT, frame(), Segmenter(MODEL_PATH, 1), 0)
+    is_red = paint_markings(NETBALL, CAMERA) > 0.8
+    is_other = paint_markings(BASKETBALL, CAMERA) > 0.8
+    assert drawn[is_red].mean() > 150
+    assert drawn[is_other & ~is_red].mean() < 80
+
+
+def test_a_frame_with_lines_of_one_colour_is_not_searched_by_colour():
+    alone = paint_frame(NETBALL, CAMERA)
+    assert draw_field_paint(FieldMap.of(NETBALL), SOUGHT, alone, Segmenter(MODEL_PATH, 1), 0) is None

@@ -5,7 +5,7 @@ import cv2
 import numpy as np
 import pytest
 
-from worker.calibration.detection.contrast import BLUE, GREEN, LUMA, LUMA_SHARES, RED
+from worker.calibration.detection.contrast import LUMA_SHARES, Channel
 from worker.video.yuv_planes import Picture, picture_of
 
 PLACES = np.random.default_rng(2).uniform(0, [63, 47], (5, 40, 2)).astype(np.float32)
@@ -22,7 +22,7 @@ def places():
     return tuple(np.ascontiguousarray(PLACES[..., axis]).reshape(-1, 40) for axis in (0, 1))
 
 
-@pytest.mark.parametrize("channel", [BLUE, GREEN, RED])
+@pytest.mark.parametrize("channel", [Channel.BLUE, Channel.GREEN, Channel.RED])
 def test_a_channel_is_read_as_it_is_when_all_of_the_picture_is_converted(channel):
     picture = smooth_picture()
     whole = picture.colours[..., channel].astype(np.float32)
@@ -36,10 +36,12 @@ def test_a_channel_is_read_as_it_is_when_all_of_the_picture_is_converted(channel
 def test_luma_is_read_as_the_shares_that_colours_have_in_it():
     picture = smooth_picture()
     expected = cv2.remap((picture.colours @ np.array(LUMA_SHARES)).astype(np.float32), *places(), cv2.INTER_LINEAR)
-    assert np.abs(picture.read(LUMA, *places()) - expected).max() < 2
+    assert np.abs(picture.read(Channel.LUMA, *places()) - expected).max() < 2
 
 
 def test_nothing_is_read_outside_of_the_picture():
     column = np.array([[-0.1, 0.0, 63.0, 63.1, 5.0, 5.0]], np.float32)
     row = np.array([[5.0, 0.0, 47.0, 5.0, -0.1, 47.1]], np.float32)
-    assert np.isnan(smooth_picture().read(LUMA, column, row)).tolist() == [[True, False, False, True, True, True]]
+    assert np.isnan(smooth_picture().read(Channel.LUMA, column, row)).tolist() == [
+        [True, False, False, True, True, True]
+    ]

@@ -1,1 +1,1 @@
-"""Checks of calibrations that others made: is it still good on this picture, and if not, why."""
+"""Checks of calibrations that others made: still good, and if not, why."""

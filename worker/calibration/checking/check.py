@@ -194,7 +194,6 @@ class _Checker:
         """Yield the readings, and whether with resized lenses, by which the open cameras are calibrated next."""
         for resized in (False, True):
             cameras = [one for one in self.open if one.has_pose and (one.resized is not None or not resized)]
-            cameras = [one for one in cameras if _has_rays_at_its_border(self._lens(one, resized))]
             if not cameras:
                 continue
             meant = [self._meant(one, TAKEN_AT_ITS_WORD, resized) for one in cameras]
@@ -257,15 +256,11 @@ class _Checker:
     def _zoomed(self, given: GivenCamera) -> SoughtCamera | None:
         if not given.has_pose or not films_a_field(given.camera.pose):
             return None
-        if not _has_rays_at_its_border(given.camera.intrinsics):
-            return None
         lens = SoughtLens.around(given.camera.intrinsics, ZOOM_UNCERTAIN)
         place = Place(position=given.camera.pose.position, radius_m=ON_ITS_MOUNT_M)
         return SoughtCamera(given.camera.id, [lens], place, roll_sigma_deg=KNOCKED_ROLL_DEG)
 
-    def _anywhere(self, given: GivenCamera) -> SoughtCamera | None:
-        if not _has_rays_at_its_border(given.camera.intrinsics):
-            return None
+    def _anywhere(self, given: GivenCamera) -> SoughtCamera:
         return SoughtCamera(given.camera.id, [SoughtLens.known(given.camera.intrinsics)], ANYWHERE)
 
     def _through_another_lens(self, given: GivenCamera) -> SoughtCamera | None:
@@ -273,8 +268,3 @@ class _Checker:
             return None
         place = Place(position=given.camera.pose.position, radius_m=ON_ITS_MOUNT_M)
         return SoughtCamera(given.camera.id, unknown_lenses(given.camera.intrinsics.size), place)
-
-
-def _has_rays_at_its_border(lens: Lens) -> bool:
-    """True for a lens that can be searched through: one that folds all around its picture cannot."""
-    return bool(np.isfinite(lens.undistort(lens.border(60))).all(axis=-1).any())

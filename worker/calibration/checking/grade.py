@@ -14,12 +14,11 @@ from worker.calibration.gate.displacement import measure_displacement
 from worker.calibration.gate.quality import CameraResult, Moved
 from worker.calibration.geometry.camera import Array, Camera, Pose
 from worker.calibration.geometry.field import Field
+from worker.calibration.robust import SURE
 
 Grade = Literal["good", "drifted", "wrong", "cannot-tell"]
 Change = Literal["turned", "moved", "zoomed", "other-lens", "other-place"]
 CauseOfGrade = Cause | Change | Literal["other-resolution", "folds", "unexplained", "no-pose"]
-SIGMAS = 3.0
-"""Standard deviations from which a difference is none of chance."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +58,7 @@ def grade(pitch: Field, checked: CheckedCamera, lens_folds: str | None) -> Grade
         said: list[tuple[CauseOfGrade, str]] = [("no-pose", "the file has a lens and no pose; one was found")]
         return GradedCamera(checked, "cannot-tell", [*folds, *said], None)
     difference = _difference(pitch, checked.meant, found)
-    tolerance = max(good_within_px(checked.meant), SIGMAS * (difference.sigma_pixels or 0.0))
+    tolerance = max(good_within_px(checked.meant), SURE * (difference.sigma_pixels or 0.0))
     written: list[tuple[CauseOfGrade, str]] = [*zip(checked.reading.causes, checked.reading.words, strict=True)]
     if checked.is_resized:
         written.append(("other-resolution", "its lens is for pictures of another resolution"))

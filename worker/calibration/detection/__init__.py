@@ -1,4 +1,4 @@
-"""From frames to evidence: which pixels are lines, and where exactly these run."""
+"""From frames to evidence: which pixels are lines, and where they run."""
 
 import os
 

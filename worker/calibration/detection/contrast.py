@@ -9,6 +9,7 @@ be as bright in green as their ground.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from enum import IntEnum
 from typing import Protocol
 
 import cv2
@@ -20,10 +21,19 @@ from worker.calibration.detection.frame_fusion import Sway, median
 from worker.calibration.detection.sampling import read_planes
 from worker.calibration.geometry.camera import Frame
 
-BLUE, GREEN, RED, LUMA = range(4)
+
+class Channel(IntEnum):
+    """Channel of a frame by its index in BGR, and its brightness."""
+
+    BLUE = 0
+    GREEN = 1
+    RED = 2
+    LUMA = 3
+
+
 LUMA_SHARES = (0.0722, 0.7152, 0.2126)
 """Shares of blue, green and red in luma, the brightness that video carries for each pixel (BT.709): mostly green."""
-CONTRASTS = tuple((channel, sign) for channel in (GREEN, RED, BLUE) for sign in (1, -1))
+CONTRASTS = tuple((channel, sign) for channel in (Channel.GREEN, Channel.RED, Channel.BLUE) for sign in (1, -1))
 """Pairs of a channel and a sign: a marking is brighter (1) or darker (-1) than its ground there. The first pair that
 its paint allows is the usual one."""
 PAINT = {
@@ -41,7 +51,7 @@ class PixelReader(Protocol):
     """Picture that is read between its pixels, at given places only."""
 
     def read(self, channel: int, column: NDArray[np.float32], row: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Return the brightness (P, N) 0..255 in a channel, or `LUMA`, at columns and rows (P, N); NaN outside."""
+        """Return the brightness (P, N) 0..255 in a channel, at columns and rows (P, N); NaN outside."""
         ...
 
 
@@ -69,7 +79,7 @@ class Channels:
 
 def _plane(frame: Frame, channel: int) -> NDArray[np.uint8]:
     """Return one channel (H, W) of a frame, its pixels beside each other."""
-    if channel == LUMA:
+    if channel == Channel.LUMA:
         return np.asarray(cv2.transform(frame, np.array([LUMA_SHARES])), dtype=np.uint8)
     return np.asarray(cv2.extractChannel(frame, channel), dtype=np.uint8)
 

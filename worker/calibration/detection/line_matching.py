@@ -13,16 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fields.shapes import WHITE
-from worker.calibration.detection.contrast import (
-    BLUE,
-    CONTRASTS,
-    GREEN,
-    LUMA,
-    RED,
-    Channels,
-    PixelReader,
-    possible_signs,
-)
+from worker.calibration.detection.contrast import CONTRASTS, Channel, Channels, PixelReader, possible_signs
 from worker.calibration.detection.line_profile import blurred_line, without_nan
 from worker.calibration.geometry.camera import Array
 from worker.calibration.geometry.visibility import VisibleLines
@@ -112,13 +103,15 @@ def known_contrasts(seen: VisibleLines, channels: Channels, reach_px: float, rel
     _, strength = _match_channels(seen, channels, reach_px, relative_size)
     chosen = _strongest(strength)
     everywhere = np.ones(len(seen), dtype=bool)
-    in_luma = {GREEN: _matches_in(channels, LUMA, seen, _bend(seen), everywhere, reach_px, relative_size)}
+    in_luma: dict[int, list[Matches]] = {
+        Channel.GREEN: _matches_in(channels, Channel.LUMA, seen, _bend(seen), everywhere, reach_px, relative_size)
+    }
     by_luma = _strengths(in_luma, seen)
     contrasts = np.array(CONTRASTS)[chosen]
     of_marking = np.arange(len(chosen))
     # Mean correlation by which a marking may stand out less in luma than in green and still be read in luma.
     as_well = by_luma[chosen, of_marking] >= strength[chosen, of_marking] - 0.05
-    contrasts[as_well & (contrasts[:, 0] == GREEN), 0] = LUMA
+    contrasts[as_well & (contrasts[:, 0] == Channel.GREEN), 0] = Channel.LUMA
     return contrasts
 
 
@@ -146,11 +139,15 @@ def _match_channels(
     white.
     """
     everywhere, bend = np.ones(len(seen), dtype=bool), _bend(seen)
-    looked = {GREEN: _matches_in(channels, GREEN, seen, bend, everywhere, reach_px, relative_size)}
+    in_green = _matches_in(channels, Channel.GREEN, seen, bend, everywhere, reach_px, relative_size)
+    looked: dict[int, list[Matches]] = {Channel.GREEN: in_green}
     strength = _strengths(looked, seen)
     chosen = (strength.max(axis=0) < LEAST_ALONG)[seen.points.marking] | (seen.points.colour != WHITE)
     if chosen.any():
-        looked |= {c: _matches_in(channels, c, seen, bend, chosen, reach_px, relative_size) for c in (RED, BLUE)}
+        looked |= {
+            c: _matches_in(channels, c, seen, bend, chosen, reach_px, relative_size)
+            for c in (Channel.RED, Channel.BLUE)
+        }
         looked = _without_other_paint(looked, seen.points.colour)
         strength = _strengths(looked, seen)
     return looked, strength
@@ -168,17 +165,27 @@ def _strongest(strength: Array) -> NDArray[np.intp]:
 def _without_other_paint(looked: Mapping[int, list[Matches]], colour: NDArray[np.str_]) -> dict[int, list[Matches]]:
     """Return the matches in three channels, opposed where another colour than the paint (N,) is seen."""
     freed = {channel: list(classes) for channel, classes in looked.items()}
-    for number, (green, red, blue) in enumerate(zip(*(looked[c] for c in (GREEN, RED, BLUE)), strict=True)):
+    for number, (green, red, blue) in enumerate(
+        zip(*(looked[c] for c in (Channel.GREEN, Channel.RED, Channel.BLUE)), strict=True)
+    ):
         named = colour[red.which] != WHITE
         everywhere = np.isin(green.which, red.which[named])
-        contrast = {GREEN: green.contrast[everywhere], RED: red.contrast[named], BLUE: blue.contrast[named]}
+        contrast = {
+            Channel.GREEN: green.contrast[everywhere],
+            Channel.RED: red.contrast[named],
+            Channel.BLUE: blue.contrast[named],
+        }
         most = np.abs(np.stack(list(contrast.values()))).max(axis=0)
         opposed = np.zeros(most.shape, dtype=bool)
         for channel, sign in CONTRASTS:
             impossible = np.array([sign not in possible_signs(str(c), channel) for c in colour[red.which[named]]], bool)
             # A third of the strongest contrast that the paint cannot have shows another paint.
             opposed |= impossible[:, None] & (sign * contrast[channel] >= 0.33 * most)
-        for channel, of_class, rows in ((GREEN, green, everywhere), (RED, red, named), (BLUE, blue, named)):
+        for channel, of_class, rows in (
+            (Channel.GREEN, green, everywhere),
+            (Channel.RED, red, named),
+            (Channel.BLUE, blue, named),
+        ):
             there = of_class.opposed.copy()
             there[rows] = opposed
             freed[channel][number] = replace(of_class, opposed=there)

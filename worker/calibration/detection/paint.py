@@ -13,21 +13,22 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.detection.segmentation import Region
 from worker.calibration.geometry.camera import Array, Frame
 
 SPREAD_RAD = 0.2
 """Spread of the colours of one paint, as an angle between differences: white and yellow on blue are 0.26 apart."""
+COMPARED_WIDTH_PX = 1280
+"""Width of the frames in which colours are compared: lines are wide enough there to show their paint."""
 ROWS = 256
 """Rows of a frame that are processed at once: a frame of 4K would take 400 MB as numbers."""
 
 
-def sort_colours(frames: Sequence[Frame], regions: Sequence[Sequence[Region]]) -> Array:
+def sort_colours(frames: Sequence[Frame], looked_at: Sequence[NDArray[np.bool_]]) -> Array:
     """Return the colours of lines on the floor, (K, 3): differences to the ground in blue, green and red, as shares.
 
-    They are read off frames (H, W, 3) where `regions` of each can show lines.
+    They are read off frames (H, W, 3) where each is `looked_at` (H, W), since it can show lines there.
     """
-    seen = np.concatenate([_colours_of_lines(frame, its) for frame, its in zip(frames, regions, strict=True)])
+    seen = np.concatenate([_colours_of_lines(frame, its) for frame, its in zip(frames, looked_at, strict=True)])
     # Number of clusters into which the colours that stand out are sorted. Halls have up to six paints; one that shines,
     # or that another line touches, has two.
     most_colours = 8
@@ -77,11 +78,8 @@ def draw_colours(frame: Frame, colours: Array, choices: Sequence[Sequence[int]])
     return drawn
 
 
-def _colours_of_lines(frame: Frame, regions: Sequence[Region]) -> NDArray[np.float32]:
+def _colours_of_lines(frame: Frame, looked_at: NDArray[np.bool_]) -> NDArray[np.float32]:
     """Return differences (N, 3) to the ground of pixels that differ most around them: the middles of lines."""
-    looked_at = np.zeros(frame.shape[:2], dtype=bool)
-    for region in regions:
-        looked_at[region.top : region.bottom, region.left : region.right] = True
     colours = []
     for rows, difference in _differences(frame):
         size = np.linalg.norm(difference, axis=-1)

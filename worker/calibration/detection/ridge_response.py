@@ -10,19 +10,22 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.detection.contrast import BLUE, GREEN, RED, Channels
+from worker.calibration.detection.contrast import Channel, Channels
 from worker.calibration.detection.streaks import DIRECTIONS, LEAST_CONTRAST, LEVELS, Streaks, level_of
 from worker.calibration.geometry.visibility import VisibleLines
 
 
 def ridge_response(channels: Channels, lines: VisibleLines, reach_px: float) -> NDArray[np.float32]:
     """Return a response (H, W) in 0..1: how much each pixel looks like one of `lines` at most `reach_px` away."""
-    height, width = channels[GREEN].shape
+    height, width = channels[Channel.GREEN].shape
     # Columns of the reduced picture in which streaks are looked for.
     working_px = 960
     size = (min(working_px, width), max(1, round(height * min(1.0, working_px / width))))
     scale = size[0] / width
-    reduced = [cv2.resize(channels[channel], size, interpolation=cv2.INTER_AREA) for channel in (BLUE, GREEN, RED)]
+    reduced = [
+        cv2.resize(channels[channel], size, interpolation=cv2.INTER_AREA)
+        for channel in (Channel.BLUE, Channel.GREEN, Channel.RED)
+    ]
     streaks = Streaks.of(np.rint(np.dstack(reduced)).astype(np.uint8))
     level = level_of(lines.width_px * scale)
     direction = np.arctan2(lines.normal[:, 1], lines.normal[:, 0]) * DIRECTIONS / np.pi

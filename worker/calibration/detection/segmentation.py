@@ -165,6 +165,14 @@ def overview(frame: Frame) -> Frame:
     return _resized(frame, (OVERVIEW_WIDTH_PX, round(height * OVERVIEW_WIDTH_PX / width)), cv2.INTER_AREA)
 
 
+def covered(regions: Sequence[Region], shape: tuple[int, ...]) -> NDArray[np.bool_]:
+    """Return True for the pixels of a frame (H, W, ...) of this shape that lie in any of the regions."""
+    inside = np.zeros(shape[:2], dtype=bool)
+    for region in regions:
+        inside[region.top : region.bottom, region.left : region.right] = True
+    return inside
+
+
 def whole_frame(size: tuple[int, int]) -> list[Region]:
     """Return regions that cover all of a frame of `size` (width, height)."""
     grid, largest = _grid(size)

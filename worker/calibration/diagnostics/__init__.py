@@ -1,1 +1,1 @@
-"""Diagnostics of a result without ground truth: markings, overlap, registration of pairs, the seam."""
+"""Diagnostics of a result: markings, overlap, pairs, the seam."""

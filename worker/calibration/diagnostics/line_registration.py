@@ -45,7 +45,7 @@ def register_lines(pitch: Field, first: MeasuredLines, second: MeasuredLines) ->
     centre = reference_point(pitch, first.camera, second.camera)
     if centre is None:
         return None
-    lines = pitch.line_points()
+    lines = pitch.measured_points
     index, a, b = np.intersect1d(first.measured.index, second.measured.index, return_indices=True)
     near = np.abs(lines.position[index, :2] - centre).max(axis=1) < FINE_HALF_M
     (put_first, sigma_first), (put_second, sigma_second) = (

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from worker.calibration.detection.contrast import Channels
 from worker.calibration.detection.line_measurement import Measurements, measure_lines
+from worker.calibration.geometry.arrays import take_rows
 from worker.calibration.geometry.camera import Array, Camera
 from worker.calibration.geometry.derivatives import POSE_NUMBERS
 from worker.calibration.geometry.field import Field, LinePoints
@@ -25,15 +26,15 @@ from worker.calibration.geometry.parameters import lens_parameters
 from worker.calibration.refinement.estimate import POSE_SIGMA
 from worker.calibration.refinement.least_squares import CLUSTER_POINTS, LEAST_NOISE
 from worker.calibration.refinement.uncertainty import RefinedPose
-from worker.calibration.robust import tukey_weights
+from worker.calibration.robust import SURE, tukey_weights
 
 Direction = Literal["outside", "inside", "right", "left", "far", "near"]
 OPPOSITE: dict[Direction, Direction] = {"outside": "inside", "right": "left", "far": "near"}
 FEWEST_MEASURED = 6
 """Fewest points of a marking, 25 cm apart, for an offset."""
 MEASURED = ("index", "pixel", "normal", "px_per_metre", "px_per_metre_up", "length_px", "trust")
-SURE, LEAST_OFF_M = 3.0, 0.03
-"""Limits from which a marking is elsewhere: in its sigmas, and in metres."""
+LEAST_OFF_M = 0.03
+"""Offset from which a marking is elsewhere, if it is sure as well."""
 USUAL_COUNTS = 1.0
 """Weight, in patches of line, of how patches usually differ beside those of the marking itself."""
 
@@ -75,7 +76,7 @@ def report_markings(
 
     `channels` of its frame and `response` (H, W), where markings that are not in their places are looked for.
     """
-    lines = pitch.line_points()
+    lines = pitch.measured_points
     names = pitch.whole_names()
     whole = {name: number for number, name in enumerate(dict.fromkeys(names))}
     group = np.array([whole[name] for name in names])
@@ -94,7 +95,7 @@ def report_markings(
             reports.append(MarkingReport(name, expected_m, share))
             continue
         offset, sigma = offsets[number]
-        direction, sign = direction_of(lines, np.flatnonzero(group[lines.marking] == number))
+        direction, sign = direction_of(lines, np.flatnonzero((group[lines.marking] == number) & ~lines.end_to_end))
         reports.append(MarkingReport(name, expected_m, share, sign * offset, sigma, direction))
     return reports
 
@@ -113,7 +114,7 @@ def _farther_away(
     pieces = group[evidence.marking]
     # A marking of which less is found is looked for farther away.
     lost = [n for n in np.unique(pieces) if evidence.found[pieces == n].mean() < 0.5]
-    its = np.flatnonzero(np.isin(group[lines.marking], lost))
+    its = np.flatnonzero(np.isin(group[lines.marking], lost) & ~lines.end_to_end)
     if len(its) == 0:
         return measured
     farther = measure_lines(lines[its], camera, channels, response, 30.0 * camera.intrinsics.relative_size)
@@ -211,7 +212,7 @@ class _Offsets:
     """Measured points M of one camera: `group` of markings and `patch` of line of each.
 
     `offset` (M,) px along their normals, `scale` (M,) px per metre, `sigma` (M,) px; `jacobian` (M, 6) of the offset by
-    the pose, and what the pose `gives` (6, M): how it moves for an offset of one sigma there; `alike` (M, C): how far
+    the pose, and what the pose `gives` (M, 6): how it moves for an offset of one sigma there; `alike` (M, C): how far
     they seem to move across their lines, m, by one standard deviation of what moves many of them: parts of the ground
     and parameters of the lens.
     """
@@ -250,7 +251,9 @@ class _Offsets:
         alike = np.concatenate([rises @ swell, by_lens], axis=1) / measured.px_per_metre[:, None]
         of_group = group[lines.marking[measured.index]]
         patch = np.unique(np.stack([of_group, measured.index // CLUSTER_POINTS]), axis=1, return_inverse=True)[1]
-        return cls(of_group, patch.ravel(), offset, measured.px_per_metre, sigma, jacobian, gives, alike)
+        every = cls(of_group, patch.ravel(), offset, measured.px_per_metre, sigma, jacobian, gives.T, alike)
+        # The pose follows the ends of marks as well, but a marking is elsewhere across itself.
+        return take_rows(every, ~measured.points.end_to_end)
 
     def means(self) -> _Means:
         """Return the mean offset of each group by its measurements."""
@@ -269,7 +272,7 @@ class _Offsets:
             mean.append(middle)
             variance.append(spread / total**2 + float(alike @ alike))
             says.append((weight / self.scale[its]) @ self.jacobian[its] / total)
-        moves = [self.gives[:, self.group == n] @ (self.scale / self.sigma)[self.group == n] for n in numbers]
+        moves = [(self.scale / self.sigma)[self.group == n] @ self.gives[self.group == n] for n in numbers]
         carried = np.array(says).reshape(-1, POSE_NUMBERS) @ np.array(moves).reshape(-1, POSE_NUMBERS).T
         return _Means(numbers, np.array(mean), np.array(variance), carried)
 

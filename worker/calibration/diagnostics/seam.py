@@ -48,7 +48,7 @@ def measure_seam(pitch: Field, first: RefinedPose, second: RefinedPose) -> Seam:
     """Measure the seam of two cameras as they stand; without places where they have measured nothing in common."""
     if first.measured is None or second.measured is None:
         return Seam([])
-    lines = pitch.line_points()
+    lines = pitch.measured_points
     index, a, b = np.intersect1d(first.measured.index, second.measured.index, return_indices=True)
     put_first, sigma_first = paint_offsets(lines, first.camera, first.measured[a])
     put_second, sigma_second = paint_offsets(lines, second.camera, second.measured[b])

@@ -1,1 +1,1 @@
-"""The quality gate: which results hold, judged without ground truth, and why the others are refused."""
+"""The quality gate: which results are accepted, without ground truth."""

@@ -1,1 +1,1 @@
-"""Geometry of a calibration: cameras, lenses, field, ground, projection and visibility."""
+"""Geometry: cameras, lenses, field, ground, projection, visibility."""

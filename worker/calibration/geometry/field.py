@@ -18,6 +18,8 @@ from fields.template import TURF_M, Template, load
 from worker.calibration.geometry.arrays import Array, take_rows
 
 FOOTBALL = load("football")
+MEASURED_SPACING_M = 0.25
+"""Distance between the line points that are measured."""
 
 
 @dataclass(frozen=True)
@@ -38,9 +40,14 @@ class Marking:
         return bool(np.allclose(self.centre[0], self.centre[-1]))
 
     @property
+    def length(self) -> float:
+        """Distance (m) between its ends."""
+        return float(np.linalg.norm(self.centre[-1] - self.centre[0]))
+
+    @property
     def spot(self) -> bool:
         """True if the marking is a disc: wider than it is long."""
-        return bool(np.linalg.norm(self.centre[-1] - self.centre[0]) < self.width and not self.closed)
+        return self.length < self.width and not self.closed
 
 
 @dataclass(frozen=True)
@@ -48,8 +55,9 @@ class LinePoints:
     """Points on the centres of markings, N of them.
 
     `position` (N, 3) metres; unit `tangent` (N, 3) along the line and unit `normal` (N, 3) across it in the surface;
-    `width` (N,) of the line; `marking` (N,) which of `Field.markings()`; `colour` (N,) of its paint; `spacing` along
-    the line; `uneven_m`: how far a usual ground of the sport is above or below the surface, a standard deviation.
+    `width` (N,) of the line; `marking` (N,) which of `Field.markings()`; `colour` (N,) of its paint; `end_to_end` (N,):
+    True for the middle of a short mark as a line across itself, whose width is the mark's length; `spacing` along the
+    line; `uneven_m`: how far a usual ground of the sport is above or below the surface, a standard deviation.
     """
 
     position: Array
@@ -58,6 +66,7 @@ class LinePoints:
     width: Array
     marking: NDArray[np.intp]
     colour: NDArray[np.str_]
+    end_to_end: NDArray[np.bool_]
     spacing: float
     uneven_m: float = TURF_M
 
@@ -180,13 +189,24 @@ class Field:
         """Return the point (3,) of a name on the surface. Raises `fields.landmarks.UnknownLandmark`."""
         return self.lift(np.array(find(name, self.template, self._size)))
 
-    def line_points(self, spacing: float = 0.25) -> LinePoints:
+    def line_points(self, spacing: float = MEASURED_SPACING_M) -> LinePoints:
         """Return points every `spacing` metres on the centres of all markings, on the surface, with directions."""
         if spacing not in self._drawn:
             markings = self.markings()
             counts = [fitting(marking.centre, spacing) for marking in markings]
             self._drawn[spacing] = self._line_points(markings, counts, spacing)
         return self._drawn[spacing]
+
+    @cached_property
+    def measured_points(self) -> LinePoints:
+        """Return `line_points`, and after them the middles of the marks that are measured from end to end as well.
+
+        The sides of a mark say where it is across itself, and its ends where it is along itself. Marks are those with
+        two ends beside which there is no other paint: of hash marks, dashes of rugby, the 7-metre line of handball.
+        """
+        markings = self.markings()
+        counts = [fitting(marking.centre, MEASURED_SPACING_M) for marking in markings]
+        return self._line_points(markings, counts, MEASURED_SPACING_M, marks_with_free_ends(markings))
 
     @cached_property
     def _drawn(self) -> dict[float, LinePoints]:
@@ -202,10 +222,14 @@ class Field:
 
     def same_line_points(self, others: LinePoints) -> LinePoints:
         """Return the points that correspond to those of the field before `resized`: as many on each marking."""
-        counts: list[int] = np.bincount(others.marking).tolist()
-        return self._line_points(self.markings(), counts, others.spacing)
+        counts: list[int] = np.bincount(others.marking[~others.end_to_end]).tolist()
+        marks: list[int] = others.marking[others.end_to_end].tolist()
+        return self._line_points(self.markings(), counts, others.spacing, marks)
 
-    def _line_points(self, markings: Sequence[Marking], counts: Sequence[int], spacing: float) -> LinePoints:
+    def _line_points(
+        self, markings: Sequence[Marking], counts: Sequence[int], spacing: float, marks: Sequence[int] = ()
+    ) -> LinePoints:
+        """Return `counts` points on each of the markings, and one in the middle of each of the `marks` among them."""
         positions, tangents, widths, index = [], [], [], []
         for number, (marking, count) in enumerate(zip(markings, counts, strict=True)):
             xy, along = equal_pieces(marking.centre, count)
@@ -213,6 +237,12 @@ class Field:
             tangents.append(along)
             widths.append(np.full(len(xy), marking.width))
             index.append(np.full(len(xy), number))
+        for number in marks:
+            xy, along = equal_pieces(markings[number].centre, 1)
+            positions.append(xy)
+            tangents.append(np.stack([-along[:, 1], along[:, 0]], axis=-1))
+            widths.append(np.array([markings[number].length]))
+            index.append(np.array([number]))
         xy, along, which = np.concatenate(positions), np.concatenate(tangents), np.concatenate(index)
         across = np.stack([-along[:, 1], along[:, 0]], axis=-1)
         return LinePoints(
@@ -222,6 +252,7 @@ class Field:
             np.concatenate(widths),
             which,
             np.array([marking.colour for marking in markings])[which],
+            np.arange(len(which)) >= sum(counts),
             spacing,
             self.template.uneven,
         )
@@ -230,6 +261,33 @@ class Field:
         """Return unit vectors (N, 3) that follow the surface from xy (N, 2) in horizontal directions (N, 2)."""
         move = self.lift(xy + step * direction) - self.lift(xy - step * direction)
         return move / np.linalg.norm(move, axis=-1, keepdims=True)
+
+
+def marks_with_free_ends(markings: Sequence[Marking]) -> list[int]:
+    """Return the numbers of the straight markings without other paint for their own length beyond either end."""
+    marks = [n for n, one in enumerate(markings) if len(one.centre) == 2 and not one.spot]
+    if not marks:
+        return []
+    pieces = np.concatenate([np.stack([one.centre[:-1], one.centre[1:]], axis=1) for one in markings])
+    counts = [len(one.centre) - 1 for one in markings]
+    owner, half_width = (
+        np.repeat(of_marking, counts) for of_marking in (np.arange(len(markings)), [m.width / 2 for m in markings])
+    )
+    ends = np.stack([markings[n].centre for n in marks])
+    half_length = np.array([markings[n].length / 2 for n in marks])[:, None]
+    along = (ends[:, 1] - ends[:, 0]) / (2 * half_length)
+    across = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    # Of every piece of paint by every mark: how far ahead of its middle and beside it the piece begins and ends.
+    from_middle = pieces - ends.mean(axis=1)[:, None, None]
+    ahead, beside = (np.einsum("mpej,mj->mpe", from_middle, axis) for axis in (along, across))
+    reach = half_width + half_width[np.searchsorted(owner, marks)][:, None]
+    touches = (beside.min(axis=2) < reach) & (beside.max(axis=2) > -reach) & (owner != np.array(marks)[:, None])
+    at_an_end = [
+        (side.max(axis=2) > half_length - half_width) & (side.min(axis=2) < 3 * half_length + half_width)
+        for side in (ahead, -ahead)
+    ]
+    free = ~(touches & np.logical_or(*at_an_end)).any(axis=1)
+    return [number for number, is_free in zip(marks, free, strict=True) if is_free]
 
 
 def resample(polyline: Array, spacing: float) -> tuple[Array, Array]:

@@ -205,7 +205,7 @@ def field_measures(pitch: Field) -> list[FieldMeasure]:
 def field_parameters(pitch: Field) -> list[FieldParameter]:
     """Return the parameters of a field that may be wrong: its measures and its skew."""
     skew = FieldSkew("skew_m", _known(pitch)["skew_m"])
-    return [*field_measures(pitch), skew.around(pitch, pitch.line_points())]
+    return [*field_measures(pitch), skew.around(pitch, pitch.measured_points)]
 
 
 def _known(pitch: Field) -> dict[str, float]:
@@ -242,15 +242,15 @@ def _ridge_height(pitch: Field, expected: float) -> FieldMeasure:
     measure = FieldMeasure(
         "ridge_height_m", expected, lambda one: one.ridge_height, lambda one, now: one.raised(now - one.ridge_height)
     )
-    return measure.around(pitch, pitch.line_points())
+    return measure.around(pitch, pitch.measured_points)
 
 
 def _length(pitch: Field, expected: float) -> FieldMeasure:
     """Return the length of the field; its ridge keeps its own."""
     measure = FieldMeasure("length_m", expected, lambda one: one.length, lambda one, now: one.resized(length=now))
-    return measure.around(pitch, pitch.line_points())
+    return measure.around(pitch, pitch.measured_points)
 
 
 def _width(pitch: Field, expected: float) -> FieldMeasure:
     measure = FieldMeasure("width_m", expected, lambda one: one.width, lambda one, now: one.resized(width=now))
-    return measure.around(pitch, pitch.line_points())
+    return measure.around(pitch, pitch.measured_points)

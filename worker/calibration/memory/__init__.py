@@ -1,1 +1,4 @@
-"""Memory of a camera's nights, so that no job is judged as if it were the first."""
+"""Memory of a camera's nights.
+
+With it no job is judged as if it were the first.
+"""

@@ -172,7 +172,7 @@ class CameraMemory:
 
 def fingerprint(lines: LinePoints) -> str:
     """Return a digest of the line points that a memory is about: another field has another one."""
-    return hashlib.sha256(np.round(lines.position, 4).tobytes()).hexdigest()[:16]
+    return hashlib.sha256(np.round(lines.position[~lines.end_to_end], 4).tobytes()).hexdigest()[:16]
 
 
 def fingerprint_of_frames(frames: Sequence[Frame]) -> str:

@@ -66,6 +66,8 @@ class _Differences:
     @classmethod
     def between(cls, last: Epoch, measured: Measurements, lines: LinePoints) -> _Differences:
         """Return the differences at the line points that were measured well in the epoch and tonight."""
+        # A mark that has moved across itself shows it at its sides, and one that is longer or shorter has not moved.
+        measured = measured[~measured.points.end_to_end]
         index, tonight, before = np.intersect1d(measured.index, last.index, return_indices=True)
         measured, camera, positions = measured[tonight], last.camera, lines.position[index]
         offset = measured.offset(camera, positions) - last.offset[before]

@@ -1,1 +1,1 @@
-"""Onboarding before the first calibration: a lens from photos of a board, a pose from clicked points."""
+"""Onboarding: a lens from photos of a board, a pose from clicked points."""

@@ -1,1 +1,1 @@
-"""Paper's own method, kept for comparison: its objective on the ground, and no refinement."""
+"""The paper's own method, kept for comparison."""

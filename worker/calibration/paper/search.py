@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from worker.calibration.geometry.camera import Array, Camera
+from worker.calibration.geometry.derivatives import POSE_NUMBERS
 from worker.calibration.geometry.field import Field
 from worker.calibration.paper.ground_objective import BROAD, NARROW, Blurs, GroundObjective
 from worker.calibration.paper.swinging import from_swinging, looked_at, swinging
 from worker.calibration.search.evolution import EvolutionStrategy, exponential_decay
-from worker.calibration.search.genome import GENES, genome_of, with_genome
+from worker.calibration.search.genome import genome_of, with_genome
 from worker.calibration.search.search import (
     DECAY,
     Found,
@@ -144,7 +145,7 @@ def grouped(cameras: int, *, alone: bool) -> list[list[int]]:
 
 def genes_of(members: Sequence[int], population: Array) -> Array:
     """Return the genes (parents, 6 M) of M neighbouring cameras in a population (parents, 6 N)."""
-    return population[:, GENES * members[0] : GENES * (members[-1] + 1)]
+    return population[:, POSE_NUMBERS * members[0] : POSE_NUMBERS * (members[-1] + 1)]
 
 
 def _mean_loss(groups: Sequence[_Group]) -> float:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from worker.calibration.geometry.camera import Array, Camera
+from worker.calibration.geometry.derivatives import POSE_NUMBERS
 from worker.calibration.geometry.rotation import rotation_matrices
-from worker.calibration.search.genome import GENES
 
 
 def looked_at(camera: Camera) -> Array:
@@ -23,7 +23,7 @@ def swinging(genomes: Array, pivots: Array) -> Array:
     The `l` of the paper's K (R | l), with the origin on the ground that the camera looks at. A turn of such a genome
     swings the camera about the pivot: the two moves that a picture can hardly tell apart are one gene and not two.
     """
-    poses = genomes.reshape(*genomes.shape[:-1], -1, GENES).copy()
+    poses = genomes.reshape(*genomes.shape[:-1], -1, POSE_NUMBERS).copy()
     turned = rotation_matrices(poses[..., :3]) @ (pivots - poses[..., 3:])[..., None]
     poses[..., 3:] = turned[..., 0]
     return np.asarray(poses.reshape(genomes.shape))
@@ -31,7 +31,7 @@ def swinging(genomes: Array, pivots: Array) -> Array:
 
 def from_swinging(genomes: Array, pivots: Array) -> Array:
     """Return genomes back from `swinging`: rotation vectors and positions C = p - R^T l."""
-    poses = genomes.reshape(*genomes.shape[:-1], -1, GENES).copy()
+    poses = genomes.reshape(*genomes.shape[:-1], -1, POSE_NUMBERS).copy()
     turned = np.swapaxes(rotation_matrices(poses[..., :3]), -1, -2) @ poses[..., 3:, None]
     poses[..., 3:] = pivots - turned[..., 0]
     return np.asarray(poses.reshape(genomes.shape))

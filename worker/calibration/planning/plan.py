@@ -133,7 +133,7 @@ class Planner:
 
     def __init__(self, pitch: Field, cameras: Sequence[Camera], state: LineState, hidden: float) -> None:
         self._pitch, self._cameras, self._state, self._hidden = pitch, cameras, state, hidden
-        self._lines, self._xy = pitch.line_points(), field_cells(pitch)
+        self._lines, self._xy = pitch.measured_points, field_cells(pitch)
         self._ground = pitch.lift(self._xy)
         self._measured = [expect_measurements(self._lines, camera, state, hidden) for camera in cameras]
         self._model = ErrorModel(pitch, cameras)

@@ -1,1 +1,1 @@
-"""Refinement: poses from near the truth onto measured lines by least squares, with covariances."""
+"""Refinement: poses onto measured lines by least squares, with covariances."""

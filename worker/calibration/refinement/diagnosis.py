@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from worker.calibration.refinement.uncertainty import Deviation
+from worker.calibration.robust import SURE
 
 MORE_OR_LESS = {
     "focal_length_px": ("a focal length", "px longer", "px shorter"),
@@ -45,8 +46,8 @@ def find_suspicions(deviations: Sequence[Deviation]) -> list[Suspicion]:
 
 def is_sure(deviation: Deviation) -> bool:
     """True if the lines contradict a given parameter."""
-    # Three sigmas of the estimate, and three of a good calibration.
-    return abs(deviation.value) > max(3.0 * deviation.sigma, 3.0 * deviation.expected)
+    # Beside the estimate's errors, and beside those of a good calibration.
+    return abs(deviation.value) > SURE * max(deviation.sigma, deviation.expected)
 
 
 def _detail(found: Deviation) -> str:

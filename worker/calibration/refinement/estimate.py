@@ -48,7 +48,7 @@ class Estimate:
         """Return the estimate before any step."""
         return cls(
             pitch,
-            pitch.line_points(),
+            pitch.measured_points,
             list(cameras),
             np.zeros(len(unknowns.parameters)),
             np.zeros(len(unknowns.ground)),

@@ -75,7 +75,7 @@ class ErrorModel:
     """Errors that cameras at their poses, their lenses and their field may have."""
 
     def __init__(self, pitch: Field, cameras: Sequence[Camera]) -> None:
-        solved = Unknowns(len(cameras), (), Ground.under(pitch.line_points()))
+        solved = Unknowns(len(cameras), (), Ground.under(pitch.measured_points))
         self._estimate = Estimate.initial(pitch, cameras, solved)
         self.unknowns = unknowns_of(self._estimate, [None] * len(cameras), solved)
 

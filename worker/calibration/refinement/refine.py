@@ -121,7 +121,7 @@ def refine(
     """
     if stitch_weight == 0 and len(cameras) > 1 and not free:
         return _each_alone(pitch, cameras, observations, stored or cameras, memories)
-    unknowns = Unknowns(len(cameras), free, Ground.under(pitch.line_points()))
+    unknowns = Unknowns(len(cameras), free, Ground.under(pitch.measured_points))
     begun = Estimate.initial(pitch, cameras, unknowns)
     remembered = memories_of_field(memories or [None] * len(cameras), begun.lines)
     refiner = _Refiner(reader or observations.reader(), unknowns, _repainted_in_memory(remembered), cameras)
@@ -280,7 +280,7 @@ def evaluate_poses(
     memories: Sequence[CameraMemory | None] | None = None,
 ) -> RefinedPoses:
     """Evaluate poses that are left as they are, with everything else; arguments as for `refine`."""
-    unknowns = Unknowns(len(cameras), free, Ground.under(pitch.line_points()))
+    unknowns = Unknowns(len(cameras), free, Ground.under(pitch.measured_points))
     estimate = Estimate.initial(pitch, cameras, unknowns)
     remembered = memories_of_field(memories or [None] * len(cameras), estimate.lines)
     refiner = _Refiner(observations.reader(), unknowns, _repainted_in_memory(remembered), cameras)
@@ -309,8 +309,8 @@ def _assessed(
 ) -> RefinedPoses:
     refiner = refiner.around(estimate)
     lines, reader = estimate.on_ground(refiner.unknowns), refiner.reader
-    evidence = reader.evidence(estimate.pitch, lines, estimate.cameras)
-    everything = _of_seen(reader.measure(lines, estimate.cameras, EVALUATION_SEARCH_PX), evidence)
+    evidence = reader.evidence(estimate.pitch, lines[~lines.end_to_end], estimate.cameras)
+    everything = _of_seen(estimate.pitch, reader.measure(lines, estimate.cameras, EVALUATION_SEARCH_PX), evidence)
     measured = with_misfit_noise(estimate, refiner.without_repainted(everything))
     # A field that is wrong looks like a ground that swells a lot: judged, it has to be an ordinary ground.
     ordinary = replace(estimate, uneven_m=min(estimate.uneven_m, refiner.unknowns.ground.usual_m))
@@ -352,6 +352,13 @@ def _moves_m(
     return {before.id: before.distance_m(after) for before, after in moved}
 
 
-def _of_seen(measured: Sequence[Measurements], evidence: Sequence[Evidence]) -> list[Measurements]:
-    """Return the measurements of markings that are seen: ridges found where a line should be and is not fix no pose."""
-    return [found[np.isin(found.points.marking, seen.seen())] for found, seen in zip(measured, evidence, strict=True)]
+def _of_seen(pitch: Field, measured: Sequence[Measurements], evidence: Sequence[Evidence]) -> list[Measurements]:
+    """Return the measurements of markings that are seen: ridges found where a line should be and is not fix no pose.
+
+    Dashes and rows are one marking.
+    """
+    whole = np.unique(pitch.whole_names(), return_inverse=True)[1]
+    return [
+        found[np.isin(whole[found.points.marking], replace(seen, marking=whole[seen.marking]).seen())]
+        for found, seen in zip(measured, evidence, strict=True)
+    ]

@@ -1,2 +1,1 @@
-"""Relocalisation: pose, and focal length where it is unknown, from one frame and the field's markings, without a
-start."""
+"""Relocalisation: pose and focal length from one frame, without a start."""

@@ -48,7 +48,7 @@ class LineView:
         small = np.asarray(
             cv2.resize(response, (2 * WIDTH_PX, round(2 * height * scale)), interpolation=cv2.INTER_AREA), np.uint8
         )
-        border = _undistorted(lens.border(60), lens, focal)
+        border = _border(lens) * focal
         # Limit of undistorted views from the principal point, in widths of a frame.
         widest = 1.3
         low = np.maximum(border.min(axis=0), -widest * WIDTH_PX)
@@ -97,6 +97,15 @@ class LineView:
         one = np.ones((len(self.starts), 1))
         normal = np.cross(np.c_[self.starts / focal_px, one], np.c_[self.ends / focal_px, one])
         return np.asarray(normal / np.linalg.norm(normal, axis=1, keepdims=True))
+
+
+def _border(lens: Lens) -> Array:
+    """Return rays (n, 2) around what a lens sees: along the border of its picture, or nearer where it folds before."""
+    centre = lens.matrix[:2, 2]
+    shares = np.linspace(1.0, 0.05, 20)[:, None, None]
+    rays = lens.undistort(centre + shares * (lens.border(60) - centre))
+    outermost = np.argmax(np.isfinite(rays).all(axis=-1), axis=0)
+    return np.asarray(rays[outermost, np.arange(rays.shape[1])])
 
 
 def _undistorted(pixels: Array, lens: Lens, focal: float) -> Array:

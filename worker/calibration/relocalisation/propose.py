@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,6 +21,9 @@ from worker.calibration.relocalisation.line_view import LineView
 from worker.calibration.relocalisation.repeated_markings import slid_along_field
 from worker.calibration.relocalisation.rotation_voting import Direction, focal_lengths, vote
 from worker.calibration.relocalisation.sought import Place, SoughtCamera, SoughtLens
+
+CAUGHT_PX = 8.0
+"""Tolerance (view px) at which cameras that lines lead to are compared, before they have climbed."""
 
 
 @dataclass(frozen=True)
@@ -47,6 +51,37 @@ def propose(field: FieldMap, response: NDArray[np.uint8], sought: SoughtCamera, 
     return sorted(found, key=lambda one: -one.agreement)
 
 
+def agreement_by_lines(field: FieldMap, response: NDArray[np.uint8], sought: SoughtCamera, seed: int) -> float:
+    """Return the best agreement 0..1 of cameras that the lines of `response` (height, width) lead to, as they are."""
+    rng = np.random.default_rng(seed)
+    best = 0.0
+    for lens in sought.lenses:
+        view = LineView.of(response, lens.lens, sought.roll_sigma_deg)
+        if view.painted_px > 0:
+            directions = vote(view, focal_lengths(view, lens), _most_directions(lens), rng)
+            best = max(
+                best,
+                float(
+                    agreement(field, view, _by_lines(field, view, lens, sought.place, directions), CAUGHT_PX).max(
+                        initial=0.0
+                    )
+                ),
+            )
+    return best
+
+
+def _most_directions(lens: SoughtLens) -> int:
+    return 24 if lens.is_known else 36
+
+
+def _by_lines(
+    field: FieldMap, view: LineView, lens: SoughtLens, place: Place, directions: Sequence[Direction]
+) -> Hypotheses:
+    """Return the cameras that look in these directions and that assignments of lines to markings lead to."""
+    most = 220 if lens.is_known else 120
+    return _at(place, field, Hypotheses.joined([positions(field, view, one, most) for one in directions]))
+
+
 def _through(
     field: FieldMap, view: LineView, lens: SoughtLens, place: Place, rng: np.random.Generator
 ) -> list[ProposedCamera]:
@@ -55,10 +90,9 @@ def _through(
         return []
     focal, known = focal_lengths(view, lens), lens.is_known
     steps = LENS_KNOWN if known else FOCAL_SOUGHT if lens.is_bend_known else LENS_SOUGHT
-    directions = _with_neighbours(vote(view, focal, 24 if known else 36, rng), rng)
-    most = 220 if known else 120
-    by_lines = _at(place, field, Hypotheses.joined([positions(field, view, one, most) for one in directions]))
-    start = _best(field, view, by_lines, 8.0, 60 if known else 160)
+    directions = _with_neighbours(vote(view, focal, _most_directions(lens), rng), rng)
+    by_lines = _by_lines(field, view, lens, place, directions)
+    start = _best(field, view, by_lines, CAUGHT_PX, 60 if known else 160)
     found, scores = climb(field, view, start, steps, rng)
     # Agreement from which nothing is drawn at random: a pose found from lines is better than any draw.
     if scores.max(initial=0.0) < 0.45:

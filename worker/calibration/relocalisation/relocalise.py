@@ -76,11 +76,13 @@ def relocalise(
     seed: int,
     pulse: Callable[[], None] = lambda: None,
     least_agreement: float = 0.0,
+    in_another_way: Callable[[Relocalisation], Relocalisation | None] = lambda _: None,
 ) -> Relocalisation:
     """Find the camera that took a frame; `response` (height, width) in 0..1 of the network; `markings`: of the field.
 
     Where its focal length is not known, k1, k2 and principal point are found with it and the pose. `pulse` is called
     every second or so, and may raise to end the search. Proposals of less than `least_agreement` are not refined.
+    `in_another_way` is asked for a better result than a refused one, before the search begins anew.
     """
     observed = FrameObservations.of(field, channels, response)
     candidates = list[Candidate]()
@@ -108,6 +110,8 @@ def relocalise(
         found = Relocalisation(
             _to_choose_from(field, markings, candidates), why_not_taken(field, markings, sought, candidates)
         )
+        if attempt == 0 and found.refusal is not None and (other := in_another_way(found)) is not None:
+            return other
         reasons = BEGUN_ANEW_WITH_OTHER_LENSES if sought.other_lenses else BEGUN_ANEW
         if found.refusal is None or found.refusal.reason not in reasons:
             break

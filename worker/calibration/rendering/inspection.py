@@ -10,28 +10,23 @@ from worker.calibration.geometry.field import Field
 from worker.calibration.onboarding.clicks import Clicks
 from worker.calibration.onboarding.first_pose_verdict import FirstPose
 from worker.calibration.onboarding.lens_calibration import LensCalibration
-from worker.calibration.rendering.markings import NEW_COLOUR
 from worker.calibration.rendering.overlays import draw_line, legend, outline
-
-WIDTH_PX = 1600
-PAPER = (250, 250, 250)
-COVERED, BARE = (205, 235, 205), (215, 215, 250)
-CORNER = (150, 90, 30)
-EXPECTED = (0, 200, 255)
+from worker.calibration.rendering.palette import PICTURE_WIDTH_PX, Palette
 
 
 def coverage_picture(found: LensCalibration) -> Frame:
     """Draw a camera's picture with every corner that was used, its residual enlarged, and the cells none reached."""
     width, height = found.lens.size
-    scale = WIDTH_PX / width
-    size = (WIDTH_PX, round(height * scale))
+    scale = PICTURE_WIDTH_PX / width
+    size = (PICTURE_WIDTH_PX, round(height * scale))
     # Below the picture there is room for the legend, which would hide corners.
-    picture = np.full((size[1] + 180, size[0], 3), PAPER, np.uint8)
+    picture = np.full((size[1] + 180, size[0], 3), Palette.PAPER, np.uint8)
     rows, columns = found.coverage.cells.shape
     for row, column in np.ndindex(rows, columns):
         box = [round(column * size[0] / columns), round(row * size[1] / rows)]
         end = [round((column + 1) * size[0] / columns), round((row + 1) * size[1] / rows)]
-        cv2.rectangle(picture, box, end, COVERED if found.coverage.cells[row, column] else BARE, cv2.FILLED)
+        colour = Palette.COVERED if found.coverage.cells[row, column] else Palette.BARE
+        cv2.rectangle(picture, box, end, colour, cv2.FILLED)
         cv2.rectangle(picture, box, end, (205, 205, 205), 1)
     lengths = np.linalg.norm(found.off, axis=1)
     # Length of the arrow for a residual of the median size.
@@ -39,16 +34,16 @@ def coverage_picture(found: LensCalibration) -> Frame:
     ends = found.corners + enlarged * found.off
     arrow = (40, 40, 220)
     for corner, end in zip((found.corners + 0.5) * scale - 0.5, (ends + 0.5) * scale - 0.5, strict=True):
-        cv2.circle(picture, _fixed(corner), 3 * 16, CORNER, cv2.FILLED, cv2.LINE_AA, shift=4)
+        cv2.circle(picture, _fixed(corner), 3 * 16, Palette.CORNER, cv2.FILLED, cv2.LINE_AA, shift=4)
         cv2.line(picture, _fixed(corner), _fixed(end), arrow, 1, cv2.LINE_AA, shift=4)
     centre = (200, 0, 200)
     _cross(picture, (found.lens.matrix[:2, 2] + 0.5) * scale - 0.5, centre, 16)
     legend(
         picture,
         [
-            ("corner of the board", CORNER),
+            ("corner of the board", Palette.CORNER),
             (f"residual x {enlarged:.0f}", arrow),
-            (f"no corner here ({1 - found.coverage.share:.0%})", BARE),
+            (f"no corner here ({1 - found.coverage.share:.0%})", Palette.BARE),
             ("principal point", centre),
         ],
     )
@@ -58,7 +53,7 @@ def coverage_picture(found: LensCalibration) -> Frame:
 def clicks_picture(pitch: Field, clicks: Clicks, found: FirstPose, frame: Frame | None) -> Frame:
     """Draw the field by the first pose, over the frame if there is one, and each click with its label's place."""
     width, height = found.camera.intrinsics.size
-    picture = np.full((height, width, 3), PAPER, np.uint8) if frame is None else frame.copy()
+    picture = np.full((height, width, 3), Palette.PAPER, np.uint8) if frame is None else frame.copy()
     thick = max(1, round(width / 1500))
     _draw_pitch(picture, pitch, found.camera, thick)
     expected = found.camera.project(clicks.world)
@@ -68,9 +63,9 @@ def clicks_picture(pitch: Field, clicks: Clicks, found: FirstPose, frame: Frame 
         colour = mislabelled if verdict.doubted else clicked
         cv2.circle(picture, _fixed(pixel), 8 * thick * 16, colour, 2 * thick, cv2.LINE_AA, shift=4)
         if np.isfinite(place).all():
-            _cross(picture, place, EXPECTED, 6 * thick)
+            _cross(picture, place, Palette.EXPECTED, 6 * thick)
             cv2.line(picture, _fixed(pixel), _fixed(place), colour, thick, cv2.LINE_AA, shift=4)
-    entries = [("pitch at the first pose", NEW_COLOUR), ("click", clicked), ("where its label is", EXPECTED)]
+    entries = [("pitch at the first pose", Palette.NEW), ("click", clicked), ("where its label is", Palette.EXPECTED)]
     legend(picture, [*entries, ("does not fit its label", mislabelled)])
     return picture
 
@@ -78,7 +73,7 @@ def clicks_picture(pitch: Field, clicks: Clicks, found: FirstPose, frame: Frame 
 def _draw_pitch(picture: Frame, pitch: Field, camera: Camera, thick: int) -> None:
     for marking in pitch.markings():
         centre, *_ = outline(marking)
-        draw_line(picture, camera.project(pitch.lift(centre)), NEW_COLOUR, thick)
+        draw_line(picture, camera.project(pitch.lift(centre)), Palette.NEW, thick)
 
 
 def _cross(picture: Frame, place: Array, colour: tuple[int, int, int], arm: int) -> None:

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from worker.calibration.geometry.camera import Array, Camera
 from worker.calibration.geometry.field import Field
-from worker.calibration.rendering.markings import NEW_COLOUR
-from worker.calibration.rendering.overlays import EDGE_GAP, STORED_COLOUR, draw_line, frame_of, outline
+from worker.calibration.rendering.overlays import EDGE_GAP, draw_line, frame_of, outline
+from worker.calibration.rendering.palette import Palette
 
 Layer = NDArray[np.uint8]
 
@@ -20,7 +20,7 @@ def stored_layer(pitch: Field, camera: Camera, size: tuple[int, int]) -> Layer:
     """Draw the centre of each marking by the stored pose; `size`: width, height of the picture it is laid over."""
     lines = [camera.project(pitch.lift(outline(marking)[0])) for marking in pitch.markings()]
     # Two strokes of the new pose frame what one of the stored pose hits.
-    return _of(STORED_COLOUR, _strokes(camera, lines, size, _thickness(0.0016, size)))
+    return _of(Palette.STORED, _strokes(camera, lines, size, _thickness(0.0016, size)))
 
 
 def new_layer(pitch: Field, camera: Camera, size: tuple[int, int]) -> Layer:
@@ -28,7 +28,7 @@ def new_layer(pitch: Field, camera: Camera, size: tuple[int, int]) -> Layer:
     thickness = _thickness(0.001, size)
     gap = EDGE_GAP * thickness * camera.intrinsics.size[0] / size[0]
     lines = [line for marking in pitch.markings() for line in frame_of(pitch, camera, marking, gap)]
-    return _of(NEW_COLOUR, _strokes(camera, lines, size, thickness))
+    return _of(Palette.NEW, _strokes(camera, lines, size, thickness))
 
 
 def mask_layer(response: NDArray[np.uint8], size: tuple[int, int]) -> Layer:

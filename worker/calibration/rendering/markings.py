@@ -10,26 +10,23 @@ import numpy as np
 from worker.calibration.diagnostics.markings import MarkingReport, in_words
 from worker.calibration.geometry.camera import Camera, Frame, inside
 from worker.calibration.geometry.field import Field
+from worker.calibration.rendering.palette import Palette
 
-# BGR. Apart from orange and from each other, by their lightness too.
-NEW_COLOUR = (255, 60, 0)
-ELSEWHERE_COLOUR = (255, 80, 255)
-MISSING_COLOUR = (240, 240, 60)
 WELL_FOUND = 0.7
-WRONG = ((f"found less than {WELL_FOUND:.0%}", MISSING_COLOUR), ("painted elsewhere", ELSEWHERE_COLOUR))
+WRONG = ((f"found less than {WELL_FOUND:.0%}", Palette.MISSING), ("painted elsewhere", Palette.ELSEWHERE))
 
 
 def colour_of(seen: MarkingReport) -> tuple[int, int, int]:
     """Return blue where all is well, magenta where the paint is elsewhere, cyan where it is hardly found."""
     if seen.is_elsewhere:
-        return ELSEWHERE_COLOUR
-    return NEW_COLOUR if seen.found >= WELL_FOUND else MISSING_COLOUR
+        return Palette.ELSEWHERE
+    return Palette.NEW if seen.found >= WELL_FOUND else Palette.MISSING
 
 
 def colours_of(pitch: Field, seen: Sequence[MarkingReport]) -> list[tuple[int, int, int]]:
     """Return the colour of each marking of the field; blue where nothing is said of it."""
     said = {one.name: colour_of(one) for one in seen}
-    return [said.get(name, NEW_COLOUR) for name in pitch.whole_names()]
+    return [said.get(name, Palette.NEW) for name in pitch.whole_names()]
 
 
 def list_wrong(picture: Frame, pitch: Field, camera: Camera, seen: Sequence[MarkingReport]) -> None:
@@ -79,7 +76,7 @@ def _write(
 
 def worst(seen: Sequence[MarkingReport]) -> list[MarkingReport]:
     """Return the markings with something wrong: those elsewhere by their offset, then others by what is missing."""
-    wrong = [one for one in seen if colour_of(one) != NEW_COLOUR]
+    wrong = [one for one in seen if colour_of(one) != Palette.NEW]
     return sorted(wrong, key=lambda one: (not one.is_elsewhere, -abs(one.offset_m or 0.0) - one.expected_m))
 
 

@@ -10,10 +10,9 @@ import numpy as np
 from worker.calibration.diagnostics.markings import MarkingReport
 from worker.calibration.geometry.camera import Array, Camera, Frame, inside
 from worker.calibration.geometry.field import Field, Marking, resample
-from worker.calibration.rendering.markings import NEW_COLOUR, WRONG, colour_of, colours_of, list_wrong
+from worker.calibration.rendering.markings import WRONG, colour_of, colours_of, list_wrong
+from worker.calibration.rendering.palette import Palette
 
-# Orange and the blue of the new pose stay apart for all common kinds of colour blindness, and both from white. BGR.
-STORED_COLOUR = (0, 140, 255)
 # From the edge of the paint to the middle of the stroke that frames it, in strokes.
 EDGE_GAP = 1.0
 
@@ -39,7 +38,7 @@ def overlay(
     if camera.ignored is not None:
         picture[camera.ignored.area] //= 2
     for marking in pitch.markings():
-        draw_line(picture, camera.project(pitch.lift(outline(marking)[0])), STORED_COLOUR, max(1, round(width / 1600)))
+        draw_line(picture, camera.project(pitch.lift(outline(marking)[0])), Palette.STORED, max(1, round(width / 1600)))
     thickness = max(1, round(width / 3000))
     pitch, camera = new
     colours = colours_of(pitch, seen)
@@ -47,7 +46,7 @@ def overlay(
         for line in frame_of(pitch, camera, marking, EDGE_GAP * thickness):
             draw_line(picture, line, colour, thickness)
     list_wrong(picture, pitch, camera, seen)
-    entries = [(f"stored {legend_for}", STORED_COLOUR), (f"new {legend_for}", NEW_COLOUR)]
+    entries = [(f"stored {legend_for}", Palette.STORED), (f"new {legend_for}", Palette.NEW)]
     used = {colour_of(one) for one in seen}
     legend(picture, [*entries, *(entry for entry in WRONG if entry[1] in used)])
     return picture
@@ -59,8 +58,8 @@ def candidate_picture(pitch: Field, camera: Camera, frame: Frame, name: str) -> 
     thickness = max(1, round(frame.shape[1] / 1600))
     for marking in pitch.markings():
         for line in frame_of(pitch, camera, marking, EDGE_GAP * thickness):
-            draw_line(picture, line, NEW_COLOUR, thickness)
-    legend(picture, [(name, NEW_COLOUR)])
+            draw_line(picture, line, Palette.NEW, thickness)
+    legend(picture, [(name, Palette.NEW)])
     return picture
 
 

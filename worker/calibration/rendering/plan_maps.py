@@ -11,21 +11,9 @@ import numpy as np
 from worker.calibration.geometry.camera import Array, Camera, Frame
 from worker.calibration.geometry.field import Field
 from worker.calibration.rendering.overlays import draw_line, outline
+from worker.calibration.rendering.palette import BGR, PICTURE_WIDTH_PX, Palette
 
-Colour = tuple[int, int, int]
-WIDTH_PX = 1600
 MARGIN_PX, TEXT_PX = 60, 26
-GROUND: Colour = (228, 228, 228)
-INK: Colour = (40, 40, 40)
-# Six steps from best to worst, in the order of ColorBrewer's RdYlBu, which stays apart for the colour-blind. BGR.
-STEPS: Sequence[Colour] = (
-    (180, 117, 69),
-    (233, 217, 171),
-    (191, 255, 255),
-    (97, 174, 253),
-    (67, 109, 244),
-    (39, 48, 215),
-)
 
 
 @dataclass(frozen=True)
@@ -34,20 +22,20 @@ class Scale:
 
     title: str
     limits: Sequence[float]
-    colours: Sequence[Colour]
+    colours: Sequence[BGR]
     names: Sequence[str]
 
 
 PLACE = Scale(
     "Expected sigma of a player's place on the ground",
     (0.03, 0.06, 0.10, 0.15, 0.25),
-    STEPS,
+    Palette.STEPS,
     ("below 3 cm", "3 to 6 cm", "6 to 10 cm", "10 to 15 cm", "15 to 25 cm", "above 25 cm"),
 )
 RESOLUTION = Scale(
     "Pixels per metre, across the line of sight",
     (10.0, 20.0, 40.0, 80.0, 160.0),
-    STEPS[::-1],
+    Palette.STEPS[::-1],
     ("below 10", "10 to 20", "20 to 40", "40 to 80", "80 to 160", "above 160"),
 )
 COVERAGE = Scale(
@@ -64,20 +52,20 @@ def plan_map(pitch: Field, values: Array, cameras: Sequence[Camera], scale: Scal
     Rows begin at the far touchline.
     """
     sheet, row_px = _Sheet(pitch, cameras), TEXT_PX * 4 // 3
-    picture = np.full((sheet.height_px + (len(scale.names) + 3) * row_px, WIDTH_PX, 3), 255, np.uint8)
+    picture = np.full((sheet.height_px + (len(scale.names) + 3) * row_px, PICTURE_WIDTH_PX, 3), 255, np.uint8)
     corners = [np.array([side * pitch.length / 2, -side * pitch.width / 2]) for side in (-1, 1)]
     (left, top), (right, bottom) = (np.rint(sheet.pixel(corner)).astype(int).tolist() for corner in corners)
     picture[top:bottom, left:right] = _coloured(values, scale, (right - left, bottom - top))
     for marking in pitch.markings():
-        draw_line(picture, sheet.pixel(outline(marking)[0]), INK, 2)
+        draw_line(picture, sheet.pixel(outline(marking)[0]), Palette.INK, 2)
     for camera in cameras:
         _draw_camera(picture, sheet, camera)
     _write(picture, scale.title, (MARGIN_PX, TEXT_PX * 2), 1.2)
-    entries = [*zip(scale.names, scale.colours, strict=True), ("not seen", GROUND)]
+    entries = [*zip(scale.names, scale.colours, strict=True), ("not seen", Palette.UNSEEN)]
     for row, (name, colour) in enumerate(entries):
         y = sheet.height_px + row * row_px
         cv2.rectangle(picture, (MARGIN_PX, y), (MARGIN_PX + 2 * TEXT_PX, y + TEXT_PX), colour, cv2.FILLED)
-        cv2.rectangle(picture, (MARGIN_PX, y), (MARGIN_PX + 2 * TEXT_PX, y + TEXT_PX), INK, 1)
+        cv2.rectangle(picture, (MARGIN_PX, y), (MARGIN_PX + 2 * TEXT_PX, y + TEXT_PX), Palette.INK, 1)
         _write(picture, name, (MARGIN_PX + 3 * TEXT_PX, y + TEXT_PX - 5), 0.85)
     return picture
 
@@ -88,7 +76,7 @@ def _coloured(values: Array, scale: Scale, size: tuple[int, int]) -> Frame:
     weight = cv2.resize(known.astype(float), size, interpolation=cv2.INTER_LINEAR)
     total = cv2.resize(np.where(known, values, 0.0), size, interpolation=cv2.INTER_LINEAR)
     step = np.searchsorted(np.array(scale.limits), total / np.maximum(weight, 1e-9))
-    colours = np.array([*scale.colours, GROUND], np.uint8)
+    colours = np.array([*scale.colours, Palette.UNSEEN], np.uint8)
     return np.asarray(colours[np.where(weight > 0.5, step, len(scale.colours))], dtype=np.uint8)
 
 
@@ -104,9 +92,9 @@ class _Sheet:
         self._low, self._high = corners.min(axis=0), corners.max(axis=0)
         wide, high = self._high - self._low
         # A field that is filmed from afar is no taller than it is wide.
-        self._scale = min((WIDTH_PX - 2 * MARGIN_PX) / wide, (WIDTH_PX - 2 * MARGIN_PX) / high)
+        self._scale = min((PICTURE_WIDTH_PX - 2 * MARGIN_PX) / wide, (PICTURE_WIDTH_PX - 2 * MARGIN_PX) / high)
         self.height_px = round(high * self._scale) + 3 * MARGIN_PX
-        self._left = (WIDTH_PX - wide * self._scale) / 2
+        self._left = (PICTURE_WIDTH_PX - wide * self._scale) / 2
 
     def pixel(self, xy: Array) -> Array:
         """Return the pixels (..., 2) of places (..., 2) of the ground."""
@@ -122,8 +110,8 @@ def _draw_camera(picture: Frame, sheet: _Sheet, camera: Camera) -> None:
     ahead = camera.pose.matrix[2, :2]
     aim = place + 6.0 * ahead / max(float(np.linalg.norm(ahead)), 1e-9)
     at, tip = (tuple(np.rint(sheet.pixel(point)).astype(int).tolist()) for point in (place, aim))
-    cv2.arrowedLine(picture, at, tip, INK, 3, cv2.LINE_AA, tipLength=0.3)
-    cv2.circle(picture, at, 9, INK, cv2.FILLED, cv2.LINE_AA)
+    cv2.arrowedLine(picture, at, tip, Palette.INK, 3, cv2.LINE_AA, tipLength=0.3)
+    cv2.circle(picture, at, 9, Palette.INK, cv2.FILLED, cv2.LINE_AA)
     # At the arrow's tip: cameras on one mast look different ways.
     (wide, high), _ = cv2.getTextSize(camera.id, cv2.FONT_HERSHEY_SIMPLEX, 0.85, 2)
     away = np.array(tip) - at
@@ -132,4 +120,4 @@ def _draw_camera(picture: Frame, sheet: _Sheet, camera: Camera) -> None:
 
 
 def _write(picture: Frame, words: str, place: tuple[int, int], size: float) -> None:
-    cv2.putText(picture, words, place, cv2.FONT_HERSHEY_SIMPLEX, size, INK, 2, cv2.LINE_AA)
+    cv2.putText(picture, words, place, cv2.FONT_HERSHEY_SIMPLEX, size, Palette.INK, 2, cv2.LINE_AA)

@@ -1,1 +1,1 @@
-"""Search from stored poses to ones near the truth: an objective for poses, and an evolution strategy."""
+"""Search around stored poses: an objective and an evolution strategy."""

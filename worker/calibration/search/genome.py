@@ -7,9 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from worker.calibration.geometry.camera import Array, Camera, Pose
-
-GENES = 6
-"""Number of genes per camera."""
+from worker.calibration.geometry.derivatives import POSE_NUMBERS
 
 
 def genome_of(cameras: Sequence[Camera]) -> Array:
@@ -19,5 +17,5 @@ def genome_of(cameras: Sequence[Camera]) -> Array:
 
 def with_genome(cameras: Sequence[Camera], genome: Array) -> list[Camera]:
     """Return the cameras at the poses of a genome (6 N,)."""
-    poses = genome.reshape(-1, GENES)
+    poses = genome.reshape(-1, POSE_NUMBERS)
     return [camera.with_pose(Pose(pose[:3], pose[3:])) for camera, pose in zip(cameras, poses, strict=True)]

@@ -1,1 +1,1 @@
-"""Stitching: the view, the place of each of its pixels in the frames, and the picture of several frames."""
+"""Stitching: the view, the maps of its pixels, the picture of several frames."""

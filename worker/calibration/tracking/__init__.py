@@ -1,1 +1,1 @@
-"""Tracking of cameras that shake while they film: the pose of each for each frame of a clip."""
+"""Tracking of cameras that shake: a pose for each frame of a clip."""

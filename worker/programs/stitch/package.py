@@ -25,9 +25,9 @@ Cameras in this order: {cameras}
 
 {how}
 view.json has the view, the cameras in their order, and how each is evened out with the others ("light"; null: not at
-all): a tone t of 0 to 255, as the file has it and not as linear light, becomes
-gain * 100 * (t / 100) ** (1 + contrast), and that is multiplied by exp(falloff * r * r), r from 0 in the middle of the
-frame to 1 in its corners; gains are of red, green and blue.
+all). A tone t of 0 to 255, as the file has it and not as linear light, becomes
+gain * 100 * (t / 100) ** (1 + contrast). That is multiplied by exp(falloff * r * r), r from 0 in the middle of the
+frame to 1 in its corners. Gains are of red, green and blue.
 
 The files hold until a camera moves or the view is changed. To fetch them anew only then (with the options of the view,
 where it is not the venue's):
@@ -40,9 +40,9 @@ The same without the script, for streams and encoders of your own; -i of the map
   ffmpeg {inputs}... -filter_complex_script stitch.ffscript -map "[stitched]" panorama.mp4
 From ffmpeg 7 on, -/filter_complex takes the place of -filter_complex_script.
 stitch.ffscript  the filter graph; its output [stitched] is yuv420p, BT.709, limited range
-*_x.pgm, *_y.pgm  of the part of the view that a camera sees, for each pixel that of its scaled frame; 65535: none
-*_dx.pgm, *_dy.pgm  how far beyond that pixel the place lies, in 256ths
-*_mask.pgm        how much a camera counts beside those before it
+*_x.pgm, *_y.pgm  of the part of the view that a camera sees, for each pixel that of its scaled frame; 65535: none.
+*_dx.pgm, *_dy.pgm  how far beyond that pixel the place lies, in 256ths.
+*_mask.pgm        how much a camera counts beside those before it.
 *_falloff.pgm     how far its pixels lie between the least and the largest multiple for the falloff of its lens
 """
 OF_ST_MAPS = """*.exr  per camera, float32, of the size of the view: red and green say where to sample its frame, 0 to 1

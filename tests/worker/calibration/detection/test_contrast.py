@@ -7,7 +7,7 @@ import pytest
 
 from fields.shapes import COLOURS
 from testbed.synthetic import CROWNED, pair, pair_markings
-from worker.calibration.detection.contrast import BLUE, GREEN, LUMA, RED, Channels, possible_signs
+from worker.calibration.detection.contrast import Channel, Channels, possible_signs
 from worker.calibration.detection.evidence import evidence_of
 from worker.calibration.detection.frame_fusion import Sway
 from worker.calibration.detection.line_matching import known_contrasts
@@ -88,7 +88,7 @@ def test_a_white_line_beside_a_blue_one_does_not_pull_it():
 
 def test_white_says_nothing_and_every_other_colour_something():
     for colour in (*COLOURS, "#102040"):
-        free = all(possible_signs(colour, channel) == (1, -1) for channel in (BLUE, GREEN, RED))
+        free = all(possible_signs(colour, channel) == (1, -1) for channel in (Channel.BLUE, Channel.GREEN, Channel.RED))
         assert free == (colour == "white")
 
 
@@ -102,12 +102,12 @@ def contrasts_of_most(colour, ground):
 
 @pytest.mark.parametrize(("colour", "sign"), [("white", 1), ("black", -1), ("yellow", 1)])
 def test_video_is_read_in_luma_where_lines_stand_out_in_it(colour, sign):
-    assert contrasts_of_most(colour, WOOD) == (LUMA, sign)
+    assert contrasts_of_most(colour, WOOD) == (Channel.LUMA, sign)
 
 
 def test_video_is_read_in_the_channel_in_which_lines_stand_out_where_luma_does_not_show_them():
     as_bright_as_blue = (40, 70, 148)
-    assert contrasts_of_most("blue", as_bright_as_blue)[0] != LUMA
+    assert contrasts_of_most("blue", as_bright_as_blue)[0] != Channel.LUMA
 
 
 def test_lines_of_known_contrasts_are_measured_as_they_are_where_these_are_looked_for():
@@ -125,5 +125,5 @@ def test_lines_of_known_contrasts_are_measured_as_they_are_where_these_are_looke
 def test_of_several_frames_each_channel_is_the_median():
     frames = [np.full((4, 5, 3), (value, 2 * value, 0), dtype=np.uint8) for value in (10, 12, 90)]
     channels = Channels(frames, [Sway(None)] * 3)
-    assert (channels[BLUE] == 12).all()
-    assert (channels[GREEN] == 24).all()
+    assert (channels[Channel.BLUE] == 12).all()
+    assert (channels[Channel.GREEN] == 24).all()

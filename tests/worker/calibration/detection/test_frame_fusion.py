@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from testbed.synthetic import BARREL, PITCH, camera, paint_frame
-from worker.calibration.detection.contrast import GREEN, Channels
+from worker.calibration.detection.contrast import Channel, Channels
 from worker.calibration.detection.frame_fusion import Sway, median, sways
 from worker.calibration.geometry.camera import Pose
 from worker.calibration.geometry.derivatives import moved
@@ -71,7 +71,7 @@ def far_line(picture):
 
 
 def brightness(pictures, swayed):
-    return median([picture[..., GREEN] for picture in pictures], swayed)
+    return median([picture[..., Channel.GREEN] for picture in pictures], swayed)
 
 
 @pytest.mark.long
@@ -83,7 +83,7 @@ def test_how_far_a_camera_turned_in_each_frame_is_found_to_a_twentieth_of_a_pixe
 
 def test_lines_thinner_than_the_shaking_stay_as_they_are_in_one_frame():
     still = [Sway(None)] * len(frames())
-    as_in_one = np.mean([far_line(brightness(frames()[:1], [])), far_line(of_mean_turn()[..., GREEN])])
+    as_in_one = np.mean([far_line(brightness(frames()[:1], [])), far_line(of_mean_turn()[..., Channel.GREEN])])
     assert far_line(brightness(frames(), found())) > 0.9 * as_in_one
     assert far_line(brightness(frames(), still)) < 0.75 * as_in_one
 
@@ -104,7 +104,7 @@ def test_frames_that_lie_on_each_other_are_left_as_they_are():
     twice = [frames()[0], frames()[0]]
     found = sways(twice, ON_A_MAST.intrinsics)
     assert [sway.shift for sway in found] == [None, None]
-    np.testing.assert_array_equal(Channels(twice, found)[GREEN], frames()[0][..., GREEN])
+    np.testing.assert_array_equal(Channels(twice, found)[Channel.GREEN], frames()[0][..., Channel.GREEN])
 
 
 def test_frames_without_anything_to_hold_on_to_are_taken_for_still():

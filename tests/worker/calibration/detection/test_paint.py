@@ -5,12 +5,11 @@ import numpy as np
 import pytest
 
 from worker.calibration.detection.paint import draw_colours, sort_colours
-from worker.calibration.detection.segmentation import Region
 
 FLOOR = (120, 118, 103)
 PAINTS = {"white": (215, 210, 205), "red": (66, 85, 170), "black": (45, 45, 45), "green": (150, 165, 130)}
 ROWS = {name: 60 + 60 * number for number, name in enumerate(PAINTS)}
-EVERYWHERE = [Region(0, 0, 640, 320)]
+EVERYWHERE = np.ones((320, 640), bool)
 
 
 @pytest.fixture
@@ -54,8 +53,10 @@ def test_a_floor_without_lines_has_no_colours():
     assert len(sort_colours([np.full((320, 640, 3), FLOOR, np.uint8)], [EVERYWHERE])) == 0
 
 
-def test_lines_are_looked_for_in_the_regions_alone(floor):
+def test_lines_are_looked_for_where_they_can_be_alone(floor):
     between = (ROWS["red"] + ROWS["white"]) // 2
-    colours = sort_colours([floor], [[Region(0, between, 640, between + 50)]])
+    there = np.zeros((320, 640), bool)
+    there[between : between + 50] = True
+    colours = sort_colours([floor], [there])
     assert nearest(colours, "red")[1] < 8
     assert nearest(colours, "white")[1] > 30

@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 
 from fields.template import Template, load
 from testbed.synthetic import CROWNED, PITCH
-from worker.calibration.geometry.field import Field, resample
+from tests.worker.calibration import sports
+from worker.calibration.geometry.field import Field, marks_with_free_ends, resample
 
 pytestmark = pytest.mark.slow
 
@@ -108,6 +109,40 @@ def test_points_stay_the_same_points_on_a_pitch_of_other_measures():
     touchline = lines.marking == 0
     along = lines.position[touchline, 0] / (CROWNED.length - 0.12)
     assert same.position[touchline, 0] / (longer.length - 0.12) == pytest.approx(along)
+
+
+@pytest.mark.parametrize(
+    ("sport", "mark", "length_m"),
+    [
+        ("american-football", "left near hash mark", 0.6096),
+        ("handball", "right 7-metre line", 1.0),
+        ("rugby-union", "left dash in front of the far post", 1.0),
+    ],
+)
+def test_a_mark_with_two_free_ends_is_measured_from_end_to_end_as_well(sport, mark, length_m):
+    pitch = sports.field(sport)
+    lines, crosswise = pitch.measured_points, pitch.line_points()
+    np.testing.assert_array_equal(lines[: len(crosswise)].position, crosswise.position)
+    its = lines[lines.end_to_end & (np.array(pitch.whole_names())[lines.marking] == mark)]
+    assert its.width == pytest.approx(length_m)
+    for middle, across, number in zip(its.position, its.normal, its.marking, strict=True):
+        ends = pitch.lift(pitch.markings()[number].centre)
+        assert middle == pytest.approx(ends.mean(axis=0))
+        assert abs((ends[1] - ends[0]) @ across) == pytest.approx(length_m, rel=1e-4)
+
+
+@pytest.mark.parametrize("sport", ["basketball", "tennis", "volleyball"])
+def test_lines_that_end_at_other_lines_have_no_free_ends(sport):
+    pitch = sports.field(sport)
+    ends = {pitch.markings()[number].name for number in marks_with_free_ends(pitch.markings())}
+    assert not [name for name in ends if "baseline" in name or "sideline" in name or "free-throw" in name]
+
+
+def test_a_field_of_another_size_has_the_same_marks_with_free_ends():
+    lines = sports.field("rugby-union").measured_points
+    same = sports.field("rugby-union").resized(width=69.0).same_line_points(lines)
+    np.testing.assert_array_equal(same.marking, lines.marking)
+    np.testing.assert_array_equal(same.end_to_end, lines.end_to_end)
 
 
 def test_a_ridge_gets_another_length_around_its_middle_as_far_as_there_is_room():

@@ -7,6 +7,7 @@ from datetime import UTC, datetime, timedelta
 import numpy as np
 import pytest
 
+from tests.worker.calibration import sports
 from tests.worker.calibration.memory.nights import LINES, PITCH, box_camera, job, measured, painted
 from worker.calibration.detection.line_measurement import NOISE_PX, SHARED_NOISE
 from worker.calibration.geometry.derivatives import moved
@@ -16,6 +17,7 @@ from worker.calibration.memory.camera_memory import (
     ANCHOR_JOBS,
     AcceptedJob,
     CameraMemory,
+    fingerprint,
     fingerprint_of_frames,
     memories_of_field,
 )
@@ -146,6 +148,12 @@ def test_a_memory_of_another_field_says_nothing_here():
     assert memories_of_field([memory, None], LINES) == [memory, None]
     wider = Field(105.0, 68.5, 0.12, PITCH.ridge)
     assert memories_of_field([memory], wider.line_points()) == [None]
+
+
+def test_a_memory_of_a_version_that_measured_no_ends_of_marks_still_counts():
+    pitch = sports.field("american-football")
+    assert len(pitch.measured_points) > len(pitch.line_points())
+    assert fingerprint(pitch.measured_points) == fingerprint(pitch.line_points())
 
 
 @pytest.mark.parametrize("count", [1, ANCHOR_JOBS, ANCHOR_JOBS + 4])

@@ -16,7 +16,8 @@ from worker.calibration.onboarding.lens_calibration import (
     calibrate_lens,
     measure_coverage,
 )
-from worker.calibration.rendering.inspection import BARE, COVERED, WIDTH_PX, coverage_picture
+from worker.calibration.rendering.inspection import coverage_picture
+from worker.calibration.rendering.palette import PICTURE_WIDTH_PX, Palette
 
 pytestmark = pytest.mark.slow
 
@@ -253,14 +254,14 @@ def test_cells_and_ninths_are_counted_where_corners_are():
 def test_the_picture_shows_bare_cells_corners_and_the_principal_point():
     found = from_the_left()
     picture = coverage_picture(found)
-    scale = WIDTH_PX / SIZE[0]
-    assert picture.shape[1] == WIDTH_PX
+    scale = PICTURE_WIDTH_PX / SIZE[0]
+    assert picture.shape[1] == PICTURE_WIDTH_PX
     # The middle of a cell on the right edge, and of one full of corners.
-    assert tuple(picture[round(SIZE[1] / 2 * scale) + 20, WIDTH_PX - 60]) == BARE
+    assert tuple(picture[round(SIZE[1] / 2 * scale) + 20, PICTURE_WIDTH_PX - 60]) == Palette.BARE
     row, column = np.unravel_index(found.coverage.cells.argmax(), found.coverage.cells.shape)
     cell = picture[
         round(row * SIZE[1] / 5 * scale) + 2 : round((row + 1) * SIZE[1] / 5 * scale) - 2,
         round(column * SIZE[0] / 8 * scale) + 2 : round((column + 1) * SIZE[0] / 8 * scale) - 2,
     ]
-    assert (cell == COVERED).all(axis=-1).any()
-    assert (cell != COVERED).any(axis=-1).mean() > 0.05
+    assert (cell == Palette.COVERED).all(axis=-1).any()
+    assert (cell != Palette.COVERED).any(axis=-1).mean() > 0.05

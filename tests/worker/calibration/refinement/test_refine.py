@@ -6,9 +6,11 @@ import cv2
 import numpy as np
 import pytest
 
+from fields.template import Template
 from testbed.synthetic import (
     BARREL,
     CROWNED,
+    camera,
     ground_behind,
     moved,
     pair,
@@ -206,6 +208,22 @@ def test_a_lone_touchline_neither_lets_a_camera_run_away_nor_makes_it_sure(disto
     assert refined.each[0].residual_px is not None
     assert np.linalg.norm(refined.cameras[0].pose.position - one.pose.position) < 1.5
     assert refined.each[0].sigma.position_m > GATE.largest_ground_sigma_m
+
+
+def test_the_ends_of_hash_marks_hold_a_camera_that_sees_only_lines_of_one_direction():
+    yards = [{"name": f"line {x}", "line": [[x, -24], [x, 24]]} for x in (-9, -4.5, 0, 4.5, 9)]
+    marks = [
+        {"name": f"mark {x} {y}", "line": [[x, y - 0.3], [x, y + 0.3]]}
+        for x in (-6, -3, -1.5, 1.5, 3, 6)
+        for y in (-3, 3)
+    ]
+    pitch = Field(110, 49, 0.1, template=Template(marking=yards + marks))
+    one = camera("left", (0.0, -60.0, 22.0), (0.0, 0.0), focal=6000.0, size=(1920, 1080))
+    refined = refine(pitch, [moved(one, by=(0.0, 0.15, 0.0))], observed(pitch, [one]), 0.5)
+    far_off = refined.cameras[0].pose.position - one.pose.position
+    seen = one.project(np.zeros((1, 3))) - refined.cameras[0].project(np.zeros((1, 3)))
+    assert np.linalg.norm(seen) < 0.3
+    assert np.linalg.norm(far_off) < 3 * refined.each[0].sigma.position_m
 
 
 @pytest.mark.parametrize("colour", [0, 2])

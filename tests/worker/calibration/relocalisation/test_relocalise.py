@@ -18,6 +18,7 @@ from worker.calibration.geometry.camera import inside
 from worker.calibration.relocalisation import relocalise as relocalisation
 from worker.calibration.relocalisation.candidate import Candidate, is_better
 from worker.calibration.relocalisation.field_map import FieldMap
+from worker.calibration.relocalisation.line_view import LineView
 from worker.calibration.relocalisation.relocalise import (
     explains_nearly_as_well,
     relocalise,
@@ -234,3 +235,15 @@ def test_a_pose_whose_lines_the_network_does_not_see_is_not_taken():
 )
 def test_a_pose_is_a_rival_if_it_may_be_the_true_one(best, other, is_rival):
     assert explains_nearly_as_well(candidate(*other), candidate(*best)) == is_rival
+
+
+def test_a_frame_is_searched_as_far_as_its_lens_sees_that_folds_all_around_it():
+    folding = camera("one", (0.2, -12.9, 9.6), (0.0, 0.0), focal=500.0, distortion=(-0.8, 0.0, 0.0, 0.0)).intrinsics
+    assert np.isnan(folding.undistort(folding.border(60))).any(axis=-1).all()
+    width, height = folding.size
+    painted = np.zeros((height, width), np.uint8)
+    painted[height // 2 - 2 : height // 2 + 3] = 255
+    view = LineView.of(painted, folding, 3.0)
+    assert view.painted_px > 0
+    assert view.covered.any()
+    assert np.isfinite(view.corner).all()

@@ -19,8 +19,9 @@ from testbed.synthetic import (
 from tests.scenes import unposed
 from worker.calibration.diagnostics.markings import MarkingReport
 from worker.calibration.geometry.camera import Pose
-from worker.calibration.rendering.markings import ELSEWHERE_COLOUR, MISSING_COLOUR, NEW_COLOUR, worst
-from worker.calibration.rendering.overlays import EDGE_GAP, STORED_COLOUR, overlay
+from worker.calibration.rendering.markings import worst
+from worker.calibration.rendering.overlays import EDGE_GAP, overlay
+from worker.calibration.rendering.palette import Palette
 
 LEFT = pair()[0]
 
@@ -46,7 +47,7 @@ def test_the_overlay_draws_both_poses_and_leaves_the_frame_alone() -> None:
     frame = pair_frames()[0].copy()
     drawn = overlay((CROWNED, moved(LEFT, rotation=(0.01, 0.0, 0.0))), (CROWNED, LEFT), frame)
     assert (frame == pair_frames()[0]).all()
-    for colour in (STORED_COLOUR, NEW_COLOUR):
+    for colour in (Palette.STORED, Palette.NEW):
         assert (np.abs(drawn[:450] - np.array(colour)).max(axis=-1) < 60).sum() > 200
 
 
@@ -65,7 +66,7 @@ def test_a_marking_that_is_elsewhere_or_missing_has_a_colour_and_words_of_its_ow
     half_found = MarkingReport("left goal line", 46.0, 0.3)
     drawn = overlay((CROWNED, LEFT), (CROWNED, LEFT), frame, seen=[half_found, circle])
     bare = overlay((CROWNED, LEFT), (CROWNED, LEFT), frame)
-    for colour, least in ((ELSEWHERE_COLOUR, 100), (MISSING_COLOUR, 60)):
+    for colour, least in ((Palette.ELSEWHERE, 100), (Palette.MISSING, 60)):
         near = [(np.abs(picture[:450] - np.array(colour)).max(axis=-1) < 40).sum() for picture in (drawn, bare)]
         assert near[0] > near[1] + least
     assert worst([half_found, MarkingReport("near touchline", 20.0, 0.9), circle]) == [circle, half_found]

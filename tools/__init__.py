@@ -1,0 +1,1 @@
+"""What makes a release and the site of the documents."""
