@@ -83,7 +83,7 @@ class Service:
         return code
 
     def worker(self) -> int:
-        """The process id of the worker that `esc up` keeps: unlike a spare one it has a session of its own."""
+        """The process id of the worker that `esc up` keeps: unlike what forked it, it has a session of its own."""
         return wait_for(lambda: next(filter(leads_a_session, children(self.process.pid)), None))
 
     def worker_beside(self, folder: Path, name: str) -> subprocess.Popen:

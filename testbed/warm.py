@@ -65,8 +65,6 @@ PROGRAMS = (
 # What the interpreter reads as it starts.
 OF_THE_INTERPRETER = "PYTHON"
 LONGEST_REQUEST = 1 << 20
-# Workers of each `esc up`: the one that it keeps, and another for when that is killed.
-SPARE_WORKERS = 2
 
 
 class Popen(subprocess.Popen):
@@ -79,12 +77,13 @@ class Popen(subprocess.Popen):
         return warm_parent()
 
     def _execute_child(self, args, *how):
-        cwd, environment, (stdin, _, _, stdout, _, stderr) = how[4], how[5], how[9:15]
+        cwd, environment, (stdin, _, _, stdout, _, stderr), new_session = how[4], how[5], how[9:15], how[20]
         asked = asked_of(args, environment)
         if asked is None or asked[0] not in self.modules:
             return super()._execute_child(args, *how)
         files = [given if given != -1 else own for own, given in enumerate((stdin, stdout, stderr))]
-        self.pid = self.parent().fork(asked, str(cwd or Path.cwd()), dict(environment or os.environ), files)
+        place = (str(cwd or Path.cwd()), dict(environment or os.environ), new_session)
+        self.pid = self.parent().fork(asked, place, files)
         self._child_created = True
         return self._close_pipe_fds(*how[9:15])
 
@@ -138,9 +137,12 @@ class WarmParent:
         )
         atexit.register(self._end)
 
-    def fork(self, asked: list[str], folder: str, environment: dict[str, str], files: list[int]) -> int:
-        """The id of a child of this process, which runs a module with these files as its first three."""
-        request = json.dumps([asked, folder, environment]).encode()
+    def fork(self, asked: list[str], place: tuple[str, dict[str, str], bool], files: list[int]) -> int:
+        """The id of a child of this process, which runs a module with these files as its first three.
+
+        `place`: its folder, its environment, and whether it has a session of its own.
+        """
+        request = json.dumps([asked, *place]).encode()
         rights = (socket.SOL_SOCKET, socket.SCM_RIGHTS, array.array("i", files))
         with self._asking:
             self._socket.sendmsg([request], [rights])
@@ -153,84 +155,35 @@ class WarmParent:
         self._process.wait()
 
 
-class ProgramParent(WarmParent):
-    """A warm parent of programs, which is forked before its parent has threads."""
-
-    def __init__(self, spare: Sequence["SpareWorker"]) -> None:
-        """`spare`: those that wait to be workers, whose pipes are none of its business."""
-        self._spare = spare
-        super().__init__()
+class ForkedParent(WarmParent):
+    """A warm parent that is forked from a service before that has threads, for its worker and its programs."""
 
     def _begin(self, theirs: socket.socket) -> None:
         asking = os.getpid()
         if os.fork():
             return
         self._socket.close()
-        for one in self._spare:
-            os.close(one._writer)
         serve(theirs, asking)
-        sys.exit(run_program(*sys.argv))
+        sys.exit(run_module())
 
 
-class SpareWorker:
-    """A child that was forked before its parent had threads, and waits to be the worker of `esc up`."""
+def started_by(parent: ForkedParent) -> type[subprocess.Popen]:
+    """Return the `Popen` of a service, which has its worker and its programs forked."""
 
-    def __init__(self, elder: Sequence["SpareWorker"]) -> None:
-        """`elder`: those that wait already, whose pipes are none of its business."""
-        reader, self._writer = os.pipe()
-        self.pid: int | None = os.fork()
-        if self.pid:
-            os.close(reader)
-            return
-        for writer in (self._writer, *(one._writer for one in elder)):
-            os.close(writer)
-        with os.fdopen(reader, "rb") as pipe:
-            asked = pipe.read()
-        if not asked:
-            os._exit(0)
-        os.setsid()
-        with Path(os.devnull).open("rb") as nothing:
-            os.dup2(nothing.fileno(), 0)
-        become(*json.loads(asked))
+    class Started(Popen):
+        modules = ("service.cli", *PROGRAMS)
 
-    def begin(self, asked: list[str], folder: str, environment: dict[str, str]) -> int | None:
-        """Start the worker, and return its process id."""
-        with os.fdopen(self._writer, "wb") as pipe:
-            pipe.write(json.dumps([asked, folder, environment]).encode())
-        return self.pid
-
-
-def spare_workers() -> list[SpareWorker]:
-    """Start the spare workers of this process; each of them goes on from here as a worker, and gets an empty list."""
-    spare: list[SpareWorker] = []
-    while len(spare) < SPARE_WORKERS:
-        spare.append(SpareWorker(spare))
-        if not spare[-1].pid:
-            return []
-    return spare
-
-
-def started_by(waiting: list[SpareWorker], programs: ProgramParent) -> type[subprocess.Popen]:
-    """Return the `Popen` of a service: its workers are the spare ones first, and its programs are forked."""
-
-    class Started(ProgramPopen):
         @staticmethod
         def parent() -> WarmParent:
-            return programs
-
-        def _execute_child(self, args, *how):
-            asked = asked_of(args, how[5])
-            if not waiting or not asked or asked[:2] != ["service.cli", "worker"]:
-                return super()._execute_child(args, *how)
-            self.pid = waiting.pop(0).begin(asked, str(how[4] or Path.cwd()), dict(how[5]))
-            self._child_created = True
-            return self._close_pipe_fds(*how[9:15])
+            return parent
 
     return Started
 
 
-def become(asked: list[str], folder: str, environment: dict[str, str]) -> None:
+def become(asked: list[str], folder: str, environment: dict[str, str], new_session: bool) -> None:
     """Take on module, arguments, folder and environment of another process."""
+    if new_session:
+        os.setsid()
     os.environ.clear()
     os.environ.update(environment)
     time.tzset()
@@ -286,9 +239,14 @@ async def prepare_routes() -> None:
     assert answer[0]["status"] == 404
 
 
-def run_program(module: str, *arguments: str) -> int | None:
-    """Run one of `PROGRAMS` as `python -m` does."""
-    return sys.modules.get(f"{module}.__main__", sys.modules[module]).main(*arguments)
+def run_module() -> int | None:
+    """Run what this process has become, as `python -m` does."""
+    if sys.argv[0] in PROGRAMS:
+        module, *arguments = sys.argv
+        return sys.modules.get(f"{module}.__main__", sys.modules[module]).main(*arguments)
+    if sys.argv[1:2] in (["up"], ["serve"]):
+        subprocess.Popen = started_by(ForkedParent())
+    return sys.modules["service.cli.main"].main()
 
 
 def compile_statements() -> None:
@@ -315,14 +273,7 @@ def main() -> None:
     gc.collect()
     gc.freeze()
     serve(socket.socket(fileno=number), asking)
-    if sys.argv[0] in PROGRAMS:
-        sys.exit(run_program(*sys.argv))
-    if sys.argv[1:2] in (["up"], ["serve"]):
-        waiting = spare_workers() if sys.argv[1] == "up" else []
-        # A spare worker has gone on from there, and is none of both.
-        if sys.argv[1:2] in (["up"], ["serve"]):
-            subprocess.Popen = started_by(waiting, ProgramParent(waiting))
-    sys.modules["service.cli.main"].main()
+    sys.exit(run_module())
 
 
 if __name__ == "__main__":
