@@ -9,12 +9,15 @@ import sqlalchemy as sa
 from obstore.exceptions import BaseError
 from obstore.store import from_url
 
+from service.schemas.addresses import HIDDEN
 from service.schemas.geometry import Intrinsics
 from service.schemas.health import Alarms as Rules
 from service.schemas.results import View
+from service.schemas.source_urls import SourceSecrets
 from service.schemas.venue import VENUE_EXAMPLE, VenueIn
 from service.store import tables
 from service.store.blobs import Blobs
+from service.store.credentials import read_credentials
 from service.store.ids import new_id
 from service.store.preconditions import Precondition
 from service.store.venues import VenueRepository
@@ -45,6 +48,18 @@ def test_jobs_that_are_not_there_are_none(stock):
     assert stock.attempts.begin(new_id()) is None
     assert stock.submissions.of(new_id()) is None
     assert stock.jobs.states([new_id()]) == {}
+
+
+def test_the_passwords_of_a_venues_sources_go_with_it(stock):
+    venue = stock.venue("v")
+    left = venue.cameras[0].model_copy(update={"source": "http://***@10.0.0.7/left.jpg"})
+    venue = venue.model_copy(update={"cameras": [left, *venue.cameras[1:]]})
+    stock.venues.put(venue, {"left": SourceSecrets("user:secret")})
+    stock.venues.delete("v")
+    with stock.engine.connect() as connection:
+        assert read_credentials(connection, "v") == {}
+    with refused("source-refused"):
+        stock.venues.put(venue, {"left": SourceSecrets(HIDDEN)})
 
 
 @in_both_homes
