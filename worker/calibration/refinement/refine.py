@@ -310,7 +310,7 @@ def _assessed(
     refiner = refiner.around(estimate)
     lines, reader = estimate.on_ground(refiner.unknowns), refiner.reader
     evidence = reader.evidence(estimate.pitch, lines[~lines.end_to_end], estimate.cameras)
-    everything = _of_seen(reader.measure(lines, estimate.cameras, EVALUATION_SEARCH_PX), evidence)
+    everything = _of_seen(estimate.pitch, reader.measure(lines, estimate.cameras, EVALUATION_SEARCH_PX), evidence)
     measured = with_misfit_noise(estimate, refiner.without_repainted(everything))
     # A field that is wrong looks like a ground that swells a lot: judged, it has to be an ordinary ground.
     ordinary = replace(estimate, uneven_m=min(estimate.uneven_m, refiner.unknowns.ground.usual_m))
@@ -352,6 +352,13 @@ def _moves_m(
     return {before.id: before.distance_m(after) for before, after in moved}
 
 
-def _of_seen(measured: Sequence[Measurements], evidence: Sequence[Evidence]) -> list[Measurements]:
-    """Return the measurements of markings that are seen: ridges found where a line should be and is not fix no pose."""
-    return [found[np.isin(found.points.marking, seen.seen())] for found, seen in zip(measured, evidence, strict=True)]
+def _of_seen(pitch: Field, measured: Sequence[Measurements], evidence: Sequence[Evidence]) -> list[Measurements]:
+    """Return the measurements of markings that are seen: ridges found where a line should be and is not fix no pose.
+
+    Dashes and rows are one marking.
+    """
+    whole = np.unique(pitch.whole_names(), return_inverse=True)[1]
+    return [
+        found[np.isin(whole[found.points.marking], replace(seen, marking=whole[seen.marking]).seen())]
+        for found, seen in zip(measured, evidence, strict=True)
+    ]
