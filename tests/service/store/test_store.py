@@ -12,6 +12,7 @@ from obstore.store import from_url
 from service.schemas.addresses import HIDDEN
 from service.schemas.geometry import Intrinsics
 from service.schemas.health import Alarms as Rules
+from service.schemas.job import JobError
 from service.schemas.results import View
 from service.schemas.source_urls import SourceSecrets
 from service.schemas.venue import VENUE_EXAMPLE, VenueIn
@@ -152,6 +153,19 @@ def gives_up_in_time(monkeypatch, address):
 
 def test_a_bucket_that_does_not_answer_is_asked_for_as_long_as_its_caller_is_patient(monkeypatch):
     assert gives_up_in_time(monkeypatch, "http://127.0.0.1:1")
+
+
+@in_both_homes
+def test_a_job_that_was_cancelled_stays_so_whatever_its_worker_still_writes(stock):
+    task = stock.attempts.begin(stock.submitted("v"))
+    stock.decisions.cancel(task.job_id)
+    before = stock.venues.get("v")
+    stock.attempts.finish(task, result(task.venue, True), [])
+    stock.attempts.fail(task, JobError(type="/problems/job-crashed", title="", detail=""))
+    assert not stock.attempts.hand_back(task)
+    job = stock.jobs.get(task.job_id)
+    assert (job.status, job.result, job.error) == ("cancelled", None, None)
+    assert stock.venues.get("v") == before
 
 
 def test_a_job_is_handed_out_with_the_lenses_that_its_poses_belong_to(stock):
