@@ -24,13 +24,15 @@ from benchmarks.truth import apart
 from demo.render import outdated
 from testbed.simulated_nights import SHARED_PX, Installation, Painted, SimulatedSight
 from worker.calibration.find_cameras import why_lens_unfit
-from worker.calibration.gate.quality import CameraResult
+from worker.calibration.gate.quality import CameraResult, Refusal
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.field import Field, LinePoints
 from worker.calibration.geometry.visibility import VisibleLines
 from worker.calibration.memory.camera_memory import CameraMemory
 from worker.calibration.refinement.diagnosis import find_suspicions
 from worker.calibration.refinement.refine import refine
+from worker.calibration.relocalisation.candidate import free_lens, shift_sigma_px, with_sigmas
+from worker.calibration.relocalisation.relocalise import LEAST_SURE
 
 
 @dataclass(frozen=True)
@@ -158,8 +160,16 @@ def _life(focal: float, view: str, mistake: Mistake) -> list[Answer]:
     finished = refine(mistake.pitch, [found], sight, 0.5, stored=[found])
     (result,) = Installation(mistake.pitch, [found]).night(sight)
     doubts = find_suspicions(finished.deviations)
-    is_found = result.accepted and why_lens_unfit(result, doubts) is None
-    answer = replace(Answer.of(result, real), accepted=is_found)
+    if result.accepted and why_lens_unfit(result, doubts) is not None:
+        # As a search does it, too: the lens that the lines have is taken in its place.
+        freed = refine(mistake.pitch, [found], sight, 0.0, free_lens(0, found)).each[0]
+        found = with_sigmas(freed)
+        shift_px = shift_sigma_px(mistake.pitch, freed)
+        (result,) = Installation(mistake.pitch, [found]).night(sight)
+        is_sure = shift_px is not None and shift_px <= LEAST_SURE / 2 * found.intrinsics.size[0]
+        result = result if is_sure else replace(result, refusal=Refusal("undetermined", "lens and pose slide together"))
+    is_found = result.accepted
+    answer = Answer.of(result, real)
     return [answer, *_later(found, real, night)] if is_found else [answer]
 
 

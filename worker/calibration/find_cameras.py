@@ -21,21 +21,24 @@ from worker.calibration.records import Calibration, Options, Progress, ProgressR
 from worker.calibration.refinement.diagnosis import Suspicion
 from worker.calibration.refinement.refine import Observations
 from worker.calibration.refinement.uncertainty import FOCAL
-from worker.calibration.relocalisation.candidate import Candidate
+from worker.calibration.relocalisation.candidate import Candidate, FrameObservations
 from worker.calibration.relocalisation.crown import find_crown
 from worker.calibration.relocalisation.field_halves import choose_sides, side_of
 from worker.calibration.relocalisation.field_map import FieldMap
 from worker.calibration.relocalisation.field_paint import draw_field_paint
-from worker.calibration.relocalisation.relocalise import NotFound, Relocalisation, relocalise, twin
+from worker.calibration.relocalisation.relocalise import NotFound, Relocalisation, relocalise, twin, why_not_taken
 from worker.calibration.relocalisation.rivals import tell_rivals_apart
 from worker.calibration.relocalisation.shared_ground import SharedGround
 from worker.calibration.relocalisation.sought import SoughtCamera, SoughtLens
 
 OF_ONE_KIND = 0.03
 """By which part the focal lengths of cameras of one kind differ, one standard deviation."""
+LENS_OFF = 0.05
+"""By which part a focal length that was given may be off, one standard deviation, once lines contradict it."""
 FITS_BETTER = 0.9
 """Of the residual that the gate allows, through a lens that was found with the pose: it bends to meet a field whose
 measures are wrong by decimetres, and what is left over is smaller for that."""
+IN_ITS_PLACE = "the lens that the lines have is taken in its place"
 SEGMENTED, SEARCHED = 0.05, 0.95
 """Share of the whole at which the frames are segmented, and the cameras found; to calibrate them is the rest. Of two
 cameras of which nothing was known (66 core-seconds) they were 0.02 and 0.95."""
@@ -134,20 +137,29 @@ def find_cameras(
         with progress.timed("refinement"):
             pitch, placed = _on_its_crown(pitch, placed, by_id, seen)
 
-    # Calibrate those that were found, as every later job will.
-    found = [one.candidates[0].camera for one in placed.values() if one.refusal is None]
-    calibrated = None
-    if found:
+    # Calibrate those that were found, as every later job will; those whose lines contradict the lens that was given
+    # once more, through the lens that the lines have.
+    remembered = _Remembered(segment, {id(frames[one][n]): r for one in placed for n, r in enumerate(responses[one])})
+    beside = [camera for camera in known if camera.id in frames]
+
+    def calibrated_where_found() -> Calibration | None:
+        found = [one.candidates[0].camera for one in placed.values() if one.refusal is None]
+        if not found:
+            return None
         progress.at_fraction("refinement", SEARCHED)
-        remembered = _Remembered(
-            segment, {id(frames[one][n]): r for one in placed for n, r in enumerate(responses[one])}
-        )
-        beside = [camera for camera in known if camera.id in frames]
-        with progress.timed("calibration"):
-            calibrated = calibrate(
-                pitch, [*found, *beside], frames, remembered, Options(seed=seed, recover="never"), stop=stop
-            )
-    judged = [_judged(camera, placed[camera.id], calibrated) for camera in sought]
+        options = Options(seed=seed, recover="never")
+        return calibrate(pitch, [*found, *beside], frames, remembered, options, stop=stop)
+
+    with progress.timed("calibration"):
+        calibrated = calibrated_where_found()
+        unfit = {} if calibrated is None else _with_unfit_lenses(sought, calibrated)
+        for camera, words in unfit.items():
+            by_id[camera] = replace(by_id[camera], lenses=[SoughtLens.around(by_id[camera].lenses[0].lens, LENS_OFF)])
+            placed[camera] = _through_lens_of_lines(pitch, markings, by_id[camera], placed[camera], seen[camera], words)
+        if unfit:
+            calibrated = calibrated_where_found()
+    judged = [_judged(camera, placed[camera.id], calibrated) for camera in by_id.values()]
+    found = [one.candidates[0].camera for one in placed.values() if one.refusal is None]
     is_side_assumed = markings.is_symmetric and not known and all(by_id[one.id].place.is_anywhere for one in found)
     return FoundCameras(
         pitch,
@@ -295,14 +307,38 @@ def _on_its_crown(
     }
 
 
+def _with_unfit_lenses(sought: Sequence[SoughtCamera], calibrated: Calibration) -> dict[str, str]:
+    """Return what speaks against the lens that was given, in words, of each camera of which anything does."""
+    results = {result.camera.id: result for result in calibrated.cameras}
+    unfit = {
+        one.id: why_lens_unfit(results[one.id], calibrated.suspicions)
+        for one in sought
+        if not one.is_lens_sought and one.id in results
+    }
+    return {camera: words for camera, words in unfit.items() if words is not None}
+
+
+def _through_lens_of_lines(
+    pitch: Field,
+    markings: FieldMap,
+    sought: SoughtCamera,
+    found: Relocalisation,
+    seen: tuple[Channels, NDArray[np.float32]],
+    words: str,
+) -> Relocalisation:
+    """Return a camera that was found with the lens that its lines have, which is `sought` now; `words`: why it is."""
+    first, *others = found.candidates
+    candidates = [FrameObservations.of(pitch, *seen).candidate(first.camera, sought), *others]
+    refusal = why_not_taken(pitch, markings, sought, candidates)
+    return replace(found, candidates=candidates, refusal=refusal, remarks=[*found.remarks, words])
+
+
 def _judged(sought: SoughtCamera, found: Relocalisation, calibrated: Calibration | None) -> FoundCamera:
     """Return the result for one camera, with the verdict of the calibration that began with it."""
     if found.refusal is not None or calibrated is None:
         return FoundCamera(sought.id, found.candidates, found.refusal, found.remarks)
     (result,) = (one for one in calibrated.cameras if one.camera.id == sought.id)
     words = why_not_confirmed(result, is_lens_found=sought.is_lens_sought)
-    if words is None and not sought.is_lens_sought:
-        words = why_lens_unfit(result, calibrated.suspicions)
     if words is not None:
         return FoundCamera(sought.id, found.candidates, NotFound("not-confirmed", words), found.remarks)
     best, *others = found.candidates
@@ -335,6 +371,8 @@ def why_lens_unfit(result: CameraResult, suspicions: Sequence[Suspicion]) -> str
 
     A job has a stored pose beside the lens. A search has nothing but the lines, and what it finds is stored.
     """
+    if result.refusal is not None:
+        return f"{result.refusal.words}: {IN_ITS_PLACE}" if result.refusal.reason == "residual" else None
     focal_px = result.camera.intrinsics.focal_length_px
     assert result.sigma is not None
     for one in suspicions:
@@ -343,13 +381,12 @@ def why_lens_unfit(result: CameraResult, suspicions: Sequence[Suspicion]) -> str
             by = f"{abs(one.deviation) / focal_px:.2%} ± {one.sigma / focal_px:.2%}"
             return (
                 f"the lines fit a focal length {by} {'longer' if one.deviation > 0 else 'shorter'} than that of the "
-                f"lens that was given, which puts the camera {away_m:.2f} m from where it seems to be; leave the lens "
-                "out, or give one that was measured"
+                f"lens that was given, which puts the camera {away_m:.2f} m from where it seems to be: {IN_ITS_PLACE}"
             )
     if result.sigma.position_m > GATE.largest_found_sigma_m:
         return (
             "how far off the lens may be that was given leaves open where the camera stands: "
-            f"{result.sigma.position_m:.2f} m (at most {GATE.largest_found_sigma_m} allowed); say how well it is known "
-            "(sigma), or leave it out"
+            f"{result.sigma.position_m:.2f} m (at most {GATE.largest_found_sigma_m} allowed): {IN_ITS_PLACE}; say how "
+            "well it is known (sigma), if it was measured"
         )
     return None

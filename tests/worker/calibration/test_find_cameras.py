@@ -12,6 +12,7 @@ from tests.worker.calibration.gate.good_result import good
 from tests.worker.calibration.outdated_pair import white_on_green
 from worker.calibration.find_cameras import FoundCamera, find_cameras, why_lens_unfit, why_not_confirmed
 from worker.calibration.gate.quality import GATE
+from worker.calibration.geometry.parameters import with_focal_length
 from worker.calibration.geometry.rotation import rotation_angles_deg
 from worker.calibration.records import Stopped
 from worker.calibration.refinement.diagnosis import find_suspicions
@@ -117,7 +118,7 @@ def test_lines_have_to_fit_better_through_a_lens_that_was_found_with_the_pose():
     most_px = GATE.most_residual_px(good().camera)
     fits_hardly = replace(good(), residual_px=0.95 * most_px)
     assert why_not_confirmed(fits_hardly, is_lens_found=False) is None
-    assert "are the measures of the field quite right?" in why_not_confirmed(fits_hardly, is_lens_found=True)
+    assert "are the measures of the field right?" in why_not_confirmed(fits_hardly, is_lens_found=True)
     assert why_not_confirmed(good(), is_lens_found=True) is None
 
 
@@ -142,9 +143,22 @@ def test_a_lens_that_was_given_and_does_not_fit_is_said_and_nothing_is_found():
     assert why_lens_unfit(result, find_suspicions([Deviation("another", **lens)])) is None
     told = why_lens_unfit(result, doubts)
     assert "a focal length 2.00% ± 0.20% shorter than that of the lens that was given" in told
-    assert "1.20 m from where it seems to be; leave the lens out" in told
+    assert "1.20 m from where it seems to be: the lens that the lines have is taken in its place" in told
 
 
 def test_a_lens_that_may_be_off_by_more_than_a_first_position_says_so():
     loose = replace(good(), covariance=np.diag([1e-4**2] * 3 + [0.3**2] * 3))
     assert "say how well it is known (sigma)" in why_lens_unfit(loose, [])
+
+
+@pytest.mark.long
+def test_where_lines_contradict_the_lens_that_is_given_the_camera_is_found_with_the_one_that_they_have():
+    left = pair()[0]
+    longer = with_focal_length(left, 0.02 * left.intrinsics.focal_length_px)
+    (found,) = find_cameras(CROWNED, [sought(longer)], [], {left.id: frames()[left.id]}, white_on_green, 1).cameras
+    assert found.accepted, found.refusal
+    assert any("the lens that the lines have is taken in its place" in remark for remark in found.remarks)
+    best = found.candidates[0].camera
+    assert best.intrinsics.sigma_from == "lines"
+    assert best.intrinsics.focal_length_px == pytest.approx(left.intrinsics.focal_length_px, rel=0.004)
+    assert best.distance_m(left) < 0.3

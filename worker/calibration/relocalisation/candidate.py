@@ -90,14 +90,14 @@ class FrameObservations:
     def assessed(self, found: RefinedPose, sought: SoughtCamera) -> Candidate:
         """Assess a refined camera by lines and paint, and note the uncertainty of a lens that was sought."""
         if sought.is_lens_sought:
-            found = replace(found, camera=_with_sigmas(found))
+            found = replace(found, camera=with_sigmas(found))
         explains = self.paint.on_markings(self.field, found.camera)
         explained = share(explains)
         seen = max(found.evidence.agreement, 0.0)
         both = 2 * seen * explained / max(seen + explained, 1e-9)
         sigma = None if found.covariance is None else Sigma.from_covariance(found.covariance)
         overlap = overlap_of(self.field, found.camera, self.observations.responses[0])
-        shift_px = _shift_sigma_px(self.field, found)
+        shift_px = shift_sigma_px(self.field, found)
         return Candidate(found.camera, both, explains, found.evidence, overlap, found.residual_px, sigma, shift_px)
 
 
@@ -121,7 +121,7 @@ def free_focal_length_and_k1(number: int, camera: Camera) -> list[LensParameter]
     return [one for one in free_lens(number, camera) if one.name in ("focal_length_px", "k1")]
 
 
-def _with_sigmas(found: RefinedPose) -> Camera:
+def with_sigmas(found: RefinedPose) -> Camera:
     """Return the camera with the uncertainty of its lens noted in it."""
     if found.refined is None:
         return found.camera
@@ -131,7 +131,7 @@ def _with_sigmas(found: RefinedPose) -> Camera:
     return found.camera.with_lens(replace(found.camera.intrinsics, sigma=known, sigma_from="lines"))
 
 
-def _shift_sigma_px(field: Field, found: RefinedPose) -> float | None:
+def shift_sigma_px(field: Field, found: RefinedPose) -> float | None:
     """Return the rms standard deviation (px) of the markings in view; None where none were measured."""
     lines = field.line_points().position
     in_view = lines[inside(found.camera.project(lines), found.camera.intrinsics.size)]
