@@ -26,8 +26,9 @@ class Store:
 
 
 async def begun(store, count):
-    while len(store.begun) < count:
-        await asyncio.sleep(0.001)
+    async with asyncio.timeout(10):
+        while len(store.begun) < count:
+            await asyncio.sleep(0.001)
 
 
 async def asked(reads, count, job_id="job"):

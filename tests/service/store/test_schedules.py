@@ -54,6 +54,14 @@ def test_how_late_a_venue_fires_is_bounded_and_always_the_same(cron, longest):
         assert next_time(cron, "UTC", first, place) == first + (next_time(cron, "UTC", exact) - exact)
 
 
+def test_a_venue_fires_before_the_next_time_even_where_times_follow_at_different_distances():
+    night = "0,5 3 * * *"
+    first = next_time(night, "UTC", at("2026-11-21T02:59"), 0.999)
+    assert at("2026-11-21T03:00") < first < at("2026-11-21T03:05")
+    second = next_time(night, "UTC", first, 0.999)
+    assert at("2026-11-21T03:05") < second <= at("2026-11-21T03:20")
+
+
 def test_a_schedule_that_must_be_exact_is(stock, schedules):
     spread = put(stock).next_at
     exact = put(stock, exact=True).next_at

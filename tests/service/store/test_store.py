@@ -9,12 +9,16 @@ import sqlalchemy as sa
 from obstore.exceptions import BaseError
 from obstore.store import from_url
 
+from service.schemas.addresses import HIDDEN
 from service.schemas.geometry import Intrinsics
 from service.schemas.health import Alarms as Rules
+from service.schemas.job import JobError
 from service.schemas.results import View
+from service.schemas.source_urls import SourceSecrets
 from service.schemas.venue import VENUE_EXAMPLE, VenueIn
 from service.store import tables
 from service.store.blobs import Blobs
+from service.store.credentials import read_credentials
 from service.store.ids import new_id
 from service.store.preconditions import Precondition
 from service.store.venues import VenueRepository
@@ -45,6 +49,18 @@ def test_jobs_that_are_not_there_are_none(stock):
     assert stock.attempts.begin(new_id()) is None
     assert stock.submissions.of(new_id()) is None
     assert stock.jobs.states([new_id()]) == {}
+
+
+def test_the_passwords_of_a_venues_sources_go_with_it(stock):
+    venue = stock.venue("v")
+    left = venue.cameras[0].model_copy(update={"source": "http://***@10.0.0.7/left.jpg"})
+    venue = venue.model_copy(update={"cameras": [left, *venue.cameras[1:]]})
+    stock.venues.put(venue, {"left": SourceSecrets("user:secret")})
+    stock.venues.delete("v")
+    with stock.engine.connect() as connection:
+        assert read_credentials(connection, "v") == {}
+    with refused("source-refused"):
+        stock.venues.put(venue, {"left": SourceSecrets(HIDDEN)})
 
 
 @in_both_homes
@@ -137,6 +153,19 @@ def gives_up_in_time(monkeypatch, address):
 
 def test_a_bucket_that_does_not_answer_is_asked_for_as_long_as_its_caller_is_patient(monkeypatch):
     assert gives_up_in_time(monkeypatch, "http://127.0.0.1:1")
+
+
+@in_both_homes
+def test_a_job_that_was_cancelled_stays_so_whatever_its_worker_still_writes(stock):
+    task = stock.attempts.begin(stock.submitted("v"))
+    stock.decisions.cancel(task.job_id)
+    before = stock.venues.get("v")
+    stock.attempts.finish(task, result(task.venue, True), [])
+    stock.attempts.fail(task, JobError(type="/problems/job-crashed", title="", detail=""))
+    assert not stock.attempts.hand_back(task)
+    job = stock.jobs.get(task.job_id)
+    assert (job.status, job.result, job.error) == ("cancelled", None, None)
+    assert stock.venues.get("v") == before
 
 
 def test_a_job_is_handed_out_with_the_lenses_that_its_poses_belong_to(stock):

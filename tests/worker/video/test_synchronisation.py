@@ -6,7 +6,7 @@ import pytest
 from testbed.parameters import try_first
 from tests.worker.video.filming import LEFT, PITCH, RIGHT, cameras, film
 from worker.video.clips import Clip
-from worker.video.synchronisation import CoarseView, chain_offsets, estimate_offset
+from worker.video.synchronisation import CoarseView, MotionSignal, chain_offsets, estimate_offset
 
 pytestmark = pytest.mark.slow
 
@@ -31,6 +31,19 @@ def test_the_offset_is_found_to_a_part_of_a_frame(left, tmp_path, offset, rate):
     found = estimate_offset(left, motion("right", path))
     assert found.second_s == pytest.approx(offset, abs=0.01)
     assert found.strength > 0.7
+
+
+@pytest.mark.parametrize("offset", [-0.51, 0.13, 0.15])
+def test_an_offset_lies_between_two_frames_on_the_side_where_motion_is_more_alike(offset):
+    # In each of ten places somebody passes six times, for a quarter of a second.
+    passes = np.random.default_rng(1).uniform(0, 8, (6, 1, 10))
+
+    def seen(begun_s):
+        times = np.arange(150) / 25
+        change = 50 * np.exp(-(((begun_s + times[:, None] - passes) / 0.12) ** 2)).sum(axis=0)
+        return MotionSignal(times, change.astype(np.float32), np.ones(10, bool))
+
+    assert estimate_offset(seen(1.0), seen(1.0 + offset)).second_s == pytest.approx(offset, abs=0.002)
 
 
 @pytest.mark.long

@@ -3,7 +3,15 @@
 import numpy as np
 import pytest
 
-from worker.calibration.tracking.motion_filter import GATE, FilterStep, PoseObservation, State, smoothed
+from worker.calibration.tracking.motion_filter import (
+    BACK_M,
+    BACK_RAD,
+    GATE,
+    FilterStep,
+    PoseObservation,
+    State,
+    smoothed,
+)
 
 FRAME_S = 0.04
 NOISE = np.repeat([np.radians(0.004), 0.004], 3)
@@ -70,6 +78,30 @@ def test_who_sees_what_comes_later_knows_more():
     )
     assert error < 0.8 * error_then
     np.testing.assert_array_equal(later[-1].mean, steps[-1].state.mean)
+
+
+def test_smoothed_states_are_those_of_least_squares_over_all_moments_at_once():
+    # Unknowns are the first state and what disturbs each step, each as twelve standard normal variables.
+    changes, certain = swinging(5), np.zeros((12, 12))
+    values, vectors = np.linalg.eigh(State(np.zeros(12), certain).after(FRAME_S).covariance)
+    disturbance = vectors * np.sqrt(np.maximum(values, 0.0))
+    transition = np.column_stack([State(unit, certain).after(FRAME_S).mean for unit in np.eye(12)])
+    jacobians = [np.eye(12, 12 * 6)]
+    jacobians[0][:, :12] = np.linalg.cholesky(State.at_reference(INFORMATION).covariance)
+    for step in range(1, 6):
+        jacobians.append(transition @ jacobians[-1])
+        jacobians[-1][:, 12 * step : 12 * step + 12] = disturbance
+    mast = np.diag(np.repeat([BACK_RAD, BACK_M], 3) ** -2.0) * FRAME_S
+    seen = [jacobian[:6] for jacobian in jacobians[1:]]
+    covariance = np.linalg.inv(np.eye(12 * 6) + sum(rows.T @ (INFORMATION + mast) @ rows for rows in seen))
+    gradient = sum(rows.T @ INFORMATION @ change for rows, change in zip(seen, changes, strict=True))
+    for state, jacobian in zip(smoothed(filtered(changes)), jacobians, strict=True):
+        expected = jacobian @ covariance @ jacobian.T
+        sigma = np.sqrt(np.diag(expected))
+        np.testing.assert_allclose(
+            state.covariance / np.outer(sigma, sigma), expected / np.outer(sigma, sigma), atol=1e-6
+        )
+        np.testing.assert_allclose(state.mean / sigma, jacobian @ covariance @ gradient / sigma, atol=1e-6)
 
 
 def test_surprise_is_as_large_as_chance_has_it_and_a_jump_exceeds_the_gate():
