@@ -64,12 +64,12 @@ def create_app(settings: Settings) -> FastAPI:
     problems.install_handlers(app)
     show_browsers_what_is_missing(app)
     _answer_outages(app)
-    app.router.routes.extend(routes_of_all())
+    app.router.routes.extend(all_routes())
     return app
 
 
 @cache
-def routes_of_all() -> Sequence[BaseRoute]:
+def all_routes() -> Sequence[BaseRoute]:
     """Return all routes, put together once for all applications of a process: a tenth of a second of work."""
     # Generated clients call their functions by the id.
     router = APIRouter(responses=OF_ANY_ROUTE, generate_unique_id_function=lambda route: route.name)

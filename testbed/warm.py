@@ -234,7 +234,7 @@ async def prepare_routes() -> None:
         answer.append(message)
 
     nowhere = {"type": "http", "method": "GET", "path": "/nowhere", "headers": [], "query_string": b""}
-    routes = sys.modules["service.app"].routes_of_all()
+    routes = sys.modules["service.app"].all_routes()
     await sys.modules["fastapi"].APIRouter(routes=[*routes])(nowhere, None, send)
     assert answer[0]["status"] == 404
 

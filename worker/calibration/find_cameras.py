@@ -39,6 +39,8 @@ FITS_BETTER = 0.9
 """Of the residual that the gate allows, through a lens that was found with the pose: it bends to meet a field whose
 measures are wrong by decimetres, and what is left over is smaller for that."""
 IN_ITS_PLACE = "the lens that the lines have is taken in its place"
+Seen = tuple[Channels, NDArray[np.float32]]
+"""Channels of a camera's frames, and the fused response (H, W) of the network in 0..1."""
 SEGMENTED, SEARCHED = 0.05, 0.95
 """Share of the whole at which the frames are segmented, and the cameras found; to calibrate them is the rest. Of two
 cameras of which nothing was known (66 core-seconds) they were 0.02 and 0.95."""
@@ -201,9 +203,7 @@ class _Remembered:
         return self._segment(frame, regions) if known is None else known
 
 
-def _seen(
-    sought: SoughtCamera, frames: Sequence[Frame], responses: Sequence[NDArray[np.uint8]]
-) -> tuple[Channels, NDArray[np.float32]]:
+def _seen(sought: SoughtCamera, frames: Sequence[Frame], responses: Sequence[NDArray[np.uint8]]) -> Seen:
     """Return the channels of a camera's frames and the fused response (H, W) in 0..1, 0 where they are ignored."""
     swayed = sways(frames, sought.lenses[0].lens)
     return Channels(frames, swayed), of_use(sought.ignored, median(responses, swayed) / np.float32(255))
@@ -222,7 +222,7 @@ class _InOnePaint:
     frame: Frame
     segment: Segment
     seed: int
-    seen: tuple[Channels, NDArray[np.float32]] | None = None
+    seen: Seen | None = None
 
     def relocalise(self, in_all: Relocalisation) -> Relocalisation | None:
         """Find the camera, or say why not; None unless its lines agree better with one paint than `in_all` colours."""
@@ -289,7 +289,7 @@ def _on_its_crown(
     flat: Field,
     placed: dict[str, Relocalisation],
     sought: Mapping[str, SoughtCamera],
-    seen: Mapping[str, tuple[Channels, NDArray[np.float32]]],
+    seen: Mapping[str, Seen],
 ) -> tuple[Field, dict[str, Relocalisation]]:
     """Return the field with the ridge that fits the lines of the cameras found on it flat, and these cameras on it."""
     found = [camera for camera, one in placed.items() if one.refusal is None]
@@ -323,7 +323,7 @@ def _through_lens_of_lines(
     markings: FieldMap,
     sought: SoughtCamera,
     found: Relocalisation,
-    seen: tuple[Channels, NDArray[np.float32]],
+    seen: Seen,
     words: str,
 ) -> Relocalisation:
     """Return a camera that was found with the lens that its lines have, which is `sought` now; `words`: why it is."""
