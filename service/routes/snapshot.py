@@ -10,7 +10,7 @@ from starlette.concurrency import run_in_threadpool
 from service.api.context import CameraIdPath, InContext, VenueIdPath
 from service.routes.contract.documented import BINARY, needs_scope
 from service.routes.contract.guarded import Guarded
-from service.routes.contract.problem_docs import OF_SOURCES, problem_responses
+from service.routes.contract.problem_docs import OF_IMAGES, OF_SOURCES, problem_responses
 from service.schemas.file_kinds import PNG_START
 from service.store.refusals import camera_of, no_such_venue
 
@@ -27,12 +27,7 @@ PICTURE: dict[int | str, dict[str, Any]] = {200: {"content": {"image/jpeg": BINA
         **problem_responses(
             *OF_SOURCES,
             "missing-camera",
-            "empty-frame",
-            "frame-too-large",
-            "not-an-image",
-            "broken-image",
-            "truncated-image",
-            "too-many-pixels",
+            *OF_IMAGES,
             "frame-size",
         ),
     },

@@ -24,15 +24,19 @@ OF_KEYS = (
     "too-many-unknown-keys",
 )
 OF_BODIES = ("malformed-request", "too-slow", "body-too-large", "encoded-body")
-# Of requests that make a job of files.
-OF_UPLOADS = (
-    "not-a-file",
+# Of files that should be pictures.
+OF_IMAGES = (
     "empty-frame",
     "frame-too-large",
     "not-an-image",
     "broken-image",
     "truncated-image",
     "too-many-pixels",
+)
+# Of requests that make a job of files.
+OF_UPLOADS = (
+    "not-a-file",
+    *OF_IMAGES,
     "callback-refused",
     "idempotency-key-reused",
     "queue-full",
