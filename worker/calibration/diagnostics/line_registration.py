@@ -54,7 +54,8 @@ def register_lines(pitch: Field, first: MeasuredLines, second: MeasuredLines) ->
     apart, sigma = put_second - put_first, np.hypot(sigma_first, sigma_second)
     known = np.isfinite(apart) & np.isfinite(sigma)
     index, apart, sigma = index[near][known], apart[known], sigma[known]
-    support_m = len(index) * lines.spacing
+    # The ends of a mark add nothing to its length.
+    support_m = int(np.sum(~lines.end_to_end[index])) * lines.spacing
     if support_m < LEAST_SUPPORT_M:
         return None
     points = lines[index]

@@ -220,6 +220,8 @@ class Planner:
 
     def _metres(self, index: NDArray[np.intp]) -> Array:
         """Return the length (K,) of each marking that is measured at line points `index` (M,), m."""
+        # The ends of a mark add nothing to its length.
+        index = index[~self._lines.end_to_end[index]]
         points = np.bincount(self._lines.marking[index], minlength=len(self._pitch.markings()))
         share = self._state.measured * (1 - self._hidden)
         return np.asarray(points * (self._lines.spacing * share), dtype=float)
