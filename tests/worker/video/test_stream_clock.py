@@ -33,8 +33,7 @@ def test_a_stream_tells_when_its_pictures_were_taken_once_its_camera_has_reporte
     assert shots[0].taken_ns is None
     assert len(off_ms) > 20
     assert np.median(off_ms) < 2
-    # A busy machine keeps one picture or the other waiting between the camera's clock and its packet.
-    assert np.quantile(off_ms, 0.9) < 20
+    assert max(off_ms) < 20
 
 
 @pytest.mark.parametrize("camera_runs", [1.0, 1.0005, 0.9995])
