@@ -12,6 +12,14 @@ from playwright.sync_api import Browser, BrowserContext, Locator, Page, Route, e
 
 from testbed.running import wait_for
 
+# In place of Playwright's own list, of which those are kept that these pages depend on.
+DISABLED_FEATURES = [
+    # With this one Chromium 156 at times never answers that a page is closed which loads itself again at that moment.
+    "RenderDocument",
+    "AvoidCorsURLLoaderRestartOnRedirect",
+    "AvoidUnnecessaryBeforeUnloadCheckSync",
+    "PaintHolding",
+]
 ARGUMENTS = [
     "--headless",
     "--no-sandbox",
@@ -21,6 +29,7 @@ ARGUMENTS = [
     "--disable-background-networking",
     "--disable-component-update",
     "--disable-sync",
+    f"--disable-features={','.join(DISABLED_FEATURES)}",
 ]
 AXE = Path(__file__).parent / "vendor" / "axe.min.js"
 PATIENCE_MS = 120_000
