@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import atan, degrees
 
@@ -19,6 +19,7 @@ from service.schemas.plan import (
     PlannedCameraResult,
     PlannedPairResult,
     PlannedSite,
+    PlanPicture,
     PlanResult,
     PlanWarningResult,
     Rows,
@@ -48,7 +49,7 @@ from worker.calibration.planning.variations import (
 )
 from worker.calibration.planning.warnings import REFUSED, PlanWarning, find_warnings
 from worker.calibration.refinement.uncertainty import Sigma
-from worker.calibration.rendering.plan_maps import COVERAGE, PLACE, RESOLUTION, plan_map
+from worker.calibration.rendering.plan_maps import COVERAGE, PLACE, RESOLUTION, Scale, plan_map
 from worker.jobs.from_schemas import encode_png, ignored_areas_of, lens_of, pitch_of
 
 WORST = 0.95
@@ -57,11 +58,11 @@ WORST = 0.95
 
 @dataclass(frozen=True)
 class PlanSolution:
-    """A plan as an answer: the `result`, its `maps` in numbers, and `pictures` (PNG files) by their names."""
+    """A plan, and as an answer: its `result` and its `maps` in numbers."""
 
+    plan: Plan
     result: PlanResult
     maps: PlanMaps
-    pictures: Mapping[str, bytes]
 
 
 def solve(site: PlannedSite, state: LineStateName, hidden: float) -> PlanSolution:
@@ -79,7 +80,27 @@ def solve(site: PlannedSite, state: LineStateName, hidden: float) -> PlanSolutio
         pairs=[_pair_result(planned, pair) for pair in planned.pairs],
         warnings=[PlanWarningResult(kind=one.kind, cameras=list(one.cameras), detail=one.words) for one in warnings],
     )
-    return PlanSolution(result, _maps(planned), _pictures(planned))
+    return PlanSolution(planned, result, _maps(planned))
+
+
+def draw_field_maps(planned: Plan) -> dict[PlanPicture, bytes]:
+    """Draw the maps of all cameras together, PNG files by their names."""
+    cameras = [one.camera for one in planned.cameras]
+    coverage = np.where(planned.coverage > 0, planned.coverage.astype(float), np.nan)
+    maps: dict[PlanPicture, tuple[Array, Scale]] = {
+        "place": (planned.place_m, PLACE),
+        "pixels-per-metre": (planned.px_per_metre, RESOLUTION),
+        "coverage": (coverage, COVERAGE),
+    }
+    return {name: encode_png(plan_map(planned.pitch, values, cameras, scale)) for name, (values, scale) in maps.items()}
+
+
+def draw_camera_maps(planned: Plan) -> dict[str, bytes]:
+    """Draw the sigma of a player's place by each camera alone, PNG files by their names."""
+    return {
+        f"place-{one.camera.id}": encode_png(plan_map(planned.pitch, one.place_m, [one.camera], PLACE))
+        for one in planned.cameras
+    }
 
 
 def _cameras(pitch: Field, site: PlannedSite) -> list[Camera]:
@@ -222,17 +243,3 @@ def _maps(planned: Plan) -> PlanMaps:
 
 def _rows(values: Array) -> Rows:
     return [[None if np.isnan(value) else round(value, 4) for value in row] for row in values.tolist()]
-
-
-def _pictures(planned: Plan) -> dict[str, bytes]:
-    cameras = [one.camera for one in planned.cameras]
-    coverage = np.where(planned.coverage > 0, planned.coverage.astype(float), np.nan)
-    drawn = {
-        "place": plan_map(planned.pitch, planned.place_m, cameras, PLACE),
-        "pixels-per-metre": plan_map(planned.pitch, planned.px_per_metre, cameras, RESOLUTION),
-        "coverage": plan_map(planned.pitch, coverage, cameras, COVERAGE),
-    }
-    drawn |= {
-        f"place-{one.camera.id}": plan_map(planned.pitch, one.place_m, [one.camera], PLACE) for one in planned.cameras
-    }
-    return {f"{name}.png": encode_png(picture) for name, picture in drawn.items()}

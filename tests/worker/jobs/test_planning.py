@@ -69,7 +69,8 @@ def test_a_whole_venue_is_planned_at_its_stored_poses():
     assert {"halfway line", "centre circle"} <= set(found.result.pairs[0].markings_m)
     assert sum(found.result.covered.values()) == pytest.approx(1.0, abs=1e-3)
     assert len(found.maps.place_m) == len(found.maps.y_m)
-    assert {"place.png", "coverage.png", "pixels-per-metre.png", "place-left.png"} <= set(found.pictures)
+    pictures = planning.draw_field_maps(found.plan) | planning.draw_camera_maps(found.plan)
+    assert pictures.keys() == {"place", "coverage", "pixels-per-metre", "place-left", "place-right"}
 
 
 def test_a_stand_gets_cameras_and_the_plan_is_a_site_to_search_for_them():
