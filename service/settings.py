@@ -174,7 +174,7 @@ class Settings(BaseSettings):
     )
     plan_program: list[str] = Field(
         [sys.executable, "-P", "-m", "worker.programs.plan"],
-        description="Program of the API that plans cameras before they are mounted.",
+        description="Program of the API that plans cameras.",
     )
 
     # Pictures and stitched views.
