@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import atan, degrees
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, StringConstraints, model_validator
@@ -17,6 +18,8 @@ from service.schemas.venue import Ignore, VenueSettings, require_distinct_ids
 LineStateName = Literal["fresh", "worn", "night"]
 HiddenShare = Annotated[float, Field(ge=0, le=0.9, allow_inf_nan=False)]
 PlanPicture = Literal["place", "pixels-per-metre", "coverage"]
+# Of lenses without distortion.
+NARROWEST_DEG, WIDEST_DEG = 2.0, 150.0
 Angle = Annotated[Number, Field(ge=-360, le=360)]
 Millimetres = Annotated[Number, Field(gt=0, le=10_000)]
 
@@ -39,7 +42,7 @@ class PlannedCameraIn(Schema):
     roll_deg: Angle = Field(0.0, description="Roll, clockwise seen from behind the camera.")
     pose: PoseIn | None = Field(None, description="Pose of a camera that stands already.")
     intrinsics: Intrinsics | None = Field(None, description="Lens that was calibrated already.")
-    field_of_view_deg: Annotated[Number, Field(ge=2, le=150)] | None = Field(
+    field_of_view_deg: Annotated[Number, Field(ge=NARROWEST_DEG, le=WIDEST_DEG)] | None = Field(
         None, description="Horizontal field of view of a lens without distortion."
     )
     focal_length_mm: Millimetres | None = Field(None, description="Focal length of a lens without distortion.")
@@ -78,7 +81,20 @@ class PlannedCameraIn(Schema):
             )
         if self.intrinsics is not None:
             check_lens(self.intrinsics, self.image_size)
+        view_deg = self.pinhole_view_deg
+        if view_deg is not None and not NARROWEST_DEG <= view_deg <= WIDEST_DEG:
+            raise ValueError(
+                f"camera {self.id}: expected a field of view of {NARROWEST_DEG:g} to {WIDEST_DEG:g} degrees, "
+                f"focal_length_mm and sensor_width_mm make {view_deg:.4g}"
+            )
         return self
+
+    @property
+    def pinhole_view_deg(self) -> float | None:
+        """Horizontal field of view of a lens without distortion; None if `intrinsics` are the lens."""
+        if self.focal_length_mm is None or self.sensor_width_mm is None:
+            return self.field_of_view_deg
+        return 2 * degrees(atan(self.sensor_width_mm / 2 / self.focal_length_mm))
 
 
 class StandIn(Schema):
@@ -138,7 +154,7 @@ def _sought(planned: PlannedCameraResult, given: PlannedCameraIn | None) -> Soug
         id=planned.id,
         image_size=planned.image_size,
         intrinsics=lens,
-        field_of_view_deg=None if lens is not None else max(planned.field_of_view_deg, 5.0),
+        field_of_view_deg=None if planned.field_of_view_deg is None or lens else max(planned.field_of_view_deg, 5.0),
         position=planned.position,
         # A mast that is put up beside its place.
         position_radius_m=3.0,
@@ -176,7 +192,9 @@ class PlannedCameraResult(Schema):
     position: list[float] = Field(description="Place, m.")
     pan_deg: float = Field(description="Pan: 0 looks along y, positive to the right.")
     tilt_deg: float = Field(description="Tilt: negative looks down.")
-    field_of_view_deg: float = Field(description="Horizontal field of view.")
+    field_of_view_deg: float | None = Field(
+        description="Horizontal field of view; null: the lens has no rays at the edges of its picture."
+    )
     calibratable: bool = Field(description="False if the quality gate would refuse its poses.")
     share_of_field: float = Field(description="Share of the field in view, 0..1.")
     sigma: Sigma = Field(description="Expected sigma of its pose, for the lens as given.")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import atan, degrees
+from math import isfinite
 
 import numpy as np
 
@@ -125,11 +125,8 @@ def _lens(given: PlannedCameraIn) -> Lens:
     if given.intrinsics is not None:
         return lens_of(given.intrinsics, given.image_size)
     width, height = given.image_size
-    if given.field_of_view_deg is not None:
-        return pinhole((width, height), given.field_of_view_deg)
-    assert given.focal_length_mm is not None
-    assert given.sensor_width_mm is not None
-    return pinhole((width, height), 2 * degrees(atan(given.sensor_width_mm / 2 / given.focal_length_mm)))
+    assert given.pinhole_view_deg is not None
+    return pinhole((width, height), given.pinhole_view_deg)
 
 
 def _pose(pitch: Field, given: PlannedCameraIn) -> Pose:
@@ -155,12 +152,13 @@ def _camera_result(
     one = planned.cameras[number]
     refused = any(one.camera.id in warning.cameras and warning.kind in REFUSED for warning in warnings)
     pan_deg, tilt_deg = pan_tilt_deg(one.camera.pose)
+    view_deg = field_of_view_deg(one.camera)
     return PlannedCameraResult(
         id=one.camera.id,
         position=one.camera.pose.position.round(3).tolist(),
         pan_deg=round(pan_deg, 2),
         tilt_deg=round(tilt_deg, 2),
-        field_of_view_deg=round(field_of_view_deg(one.camera), 2),
+        field_of_view_deg=round(view_deg, 2) if isfinite(view_deg) else None,
         image_size=list(one.camera.intrinsics.size),
         calibratable=not refused,
         share_of_field=round(one.share, 4),
@@ -171,14 +169,16 @@ def _camera_result(
         calibration_m=_spread(one.calibrated_m, WORST),
         px_per_metre=_spread(one.px_per_metre, 1 - WORST),
         px_per_metre_along=_spread(one.px_per_metre_along, 1 - WORST),
-        decisive_markings=[_decisive(planned, one, marking) for marking in decisive],
+        decisive_markings=[result for marking in decisive if (result := _decisive(planned, one, marking))],
         one_metre_higher=_change(higher(planned, number)),
     )
 
 
-def _decisive(planned: Plan, one: CameraPlan, marking: DecisiveMarking) -> DecisiveMarkingResult:
+def _decisive(planned: Plan, one: CameraPlan, marking: DecisiveMarking) -> DecisiveMarkingResult | None:
     change = _change(marking.without)
-    assert change is not None
+    if change is None:
+        # No cell of the map is in view.
+        return None
     return DecisiveMarkingResult(
         marking=marking.name, measured_m=_metres_by_name(planned.pitch, one.line_m)[marking.name], without=change
     )
