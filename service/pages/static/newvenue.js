@@ -76,6 +76,7 @@ async function add(files) {
 /** Returns the steps that are still missing. */
 function tell() {
   const open = missingOfPitch();
+  for (const camera of cameras) camera.field("view").placeholder = planned.get(camera.id)?.view ?? "not known";
   if (!cameras.length) open.push("a frame");
   if (cameras.some((camera) => !camera.id || !camera.field("camera").checkValidity())) open.push("an id of each camera");
   if (new Set(cameras.map((camera) => camera.id)).size < cameras.length) open.push("cameras of different names");

@@ -11,9 +11,10 @@ const missing = document.getElementById("missing");
 const refused = document.getElementById("refused");
 const result = document.getElementById("planned");
 const NUMBERS = ["x", "y", "z", "look_x", "look_y", "view"];
-// Two cameras on one mast beside the halfway line, in parts of the length and the width of the field: on a football
-// pitch 12 m up and 15 m away, as in the first row of the rules of thumb.
-const MAST = {away: 0.72, height: 0.176, aside: 0.229, aim: -0.147, view: 75};
+// Two cameras on one mast beside the halfway line, in parts of the width of the field, in a small hall `least_m` up and
+// away: on a football pitch 12 m up and 15 m away, as in the first row of the rules of thumb. They look as far to the
+// side as `aside` of the distance.
+const MAST = {away: 0.22, height: 0.176, least_m: 5, aim: -0.147, aside: 0.603, view: 75};
 const cameras = [];
 let answer = null;
 
@@ -50,8 +51,9 @@ class PlannedCamera {
   /** Put the camera on the mast, unless somebody has placed it. */
   propose() {
     if (this.isTouched || !pitch.plan) return;
-    const {length_m: length, width_m: width} = pitch.plan.field;
-    const place = {x: 0.5 * this.side, y: -MAST.away * width, z: MAST.height * width, look_x: MAST.aside * this.side * length, look_y: MAST.aim * width, view: MAST.view};
+    const width = pitch.plan.field.width_m;
+    const [x, y, aim] = [0.5 * this.side, -width / 2 - Math.max(MAST.least_m, MAST.away * width), MAST.aim * width];
+    const place = {x, y, z: Math.max(MAST.least_m, MAST.height * width), look_x: x + this.side * MAST.aside * (aim - y), look_y: aim, view: MAST.view};
     for (const name of NUMBERS) this.field(name).value = Math.round(10 * place[name]) / 10;
   }
 
@@ -87,9 +89,11 @@ function drawCameras() {
   const {length_m: length, width_m: width} = pitch.plan.field;
   const placed = cameras.filter((camera) => camera.isComplete).map((camera) => camera.wire);
   const margin = 0.07 * length;
-  const half = (axis, least) => Math.max(least, ...placed.map((camera) => Math.abs(camera.position[axis]))) + margin;
-  const [side, end] = [half(0, length / 2), half(1, width / 2)];
-  svg.setAttribute("viewBox", `${-side} ${-end} ${2 * side} ${2 * end}`);
+  const [[left, right], [bottom, top]] = [length, width].map((extent, axis) => {
+    const all = [-extent / 2, extent / 2, ...placed.map((camera) => camera.position[axis])];
+    return [Math.min(...all) - margin, Math.max(...all) + margin];
+  });
+  svg.setAttribute("viewBox", `${left} ${-top} ${right - left} ${top - bottom}`);
   const group = drawn("g", {}, svg);
   for (const {id, position: [x, y], look_at: [lookX, lookY], field_of_view_deg: view} of placed) {
     const ahead = Math.atan2(lookY - y, lookX - x);
