@@ -192,8 +192,8 @@ class FieldOfPlay(Schema):
     sigma: dict[FieldNumber, Annotated[Number, Field(gt=0, le=MOST_SIGMA_M)]] = Field(
         {},
         description="Uncertainty of the field's dimensions: one standard deviation by name, m. Absent: 0.02 for the "
-        "ridge, and that of a careful tape measurement for length and width (0.03 %), or that of their last digit "
-        "where the rules leave them to each ground (105 is known to 0.29, 104.6 to 0.03). The sigma of poses has it.",
+        "ridge, and that of a careful tape measurement for length and width (0.03 %). Where the rules leave these to "
+        "each ground, it is that of their last digit: 105 is known to 0.29, 104.6 to 0.03. Poses include it.",
         examples=[{"length_m": 0.5, "width_m": 0.5}],
     )
     other_markings: Annotated[list[OtherMarking], Field(max_length=500)] = Field(
