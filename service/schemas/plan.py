@@ -278,7 +278,7 @@ class PlanAnswer(Schema):
 
     plan: PlanResult = Field(description="Expected calibration.")
     maps: PlanMaps = Field(description="Maps of the field in numbers.")
-    pictures: dict[PlanPicture, str] = Field(
-        description="The field from above as PNG files in base64: sigma of a player's place, pixels per metre, number "
-        "of cameras."
+    pictures: dict[str, str] = Field(
+        description="The field from above as PNG files in base64: `place` (sigma of a player's place), "
+        "`pixels-per-metre`, `coverage` (number of cameras)."
     )
