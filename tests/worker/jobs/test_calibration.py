@@ -232,6 +232,12 @@ def test_the_outcome_is_what_was_found_with_pictures_and_provenance(venue, files
 
 
 @pytest.mark.usefixtures("drawn")
+def test_only_the_pictures_are_drawn_that_are_named(venue, files, means):
+    outcome = solve(venue, files, Options(seed=7), means, lambda _: None, pictures=["preview", "overlay_left"])
+    assert set(outcome.pictures) - MASKS == {"preview", "overlay_left"}
+
+
+@pytest.mark.usefixtures("drawn")
 def test_pictures_of_poses_that_are_accepted_wait_for_who_looks_but_for_what_the_network_saw(
     venue, files, asked, means
 ):
