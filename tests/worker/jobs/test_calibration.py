@@ -277,7 +277,7 @@ def test_a_picture_drawn_later_is_the_one_that_the_job_draws(venue, files, asked
     drawn_later = drawn_by_a_process if options == Options() else drawn_here
     for name in ("preview", "birdseye", "frame_left", "frame_right"):
         needed = {camera: file for camera, file in first.items() if not name.startswith("frame") or camera in name}
-        given = DrawingRequest.of(venue, outcome.result, [name], 1, needed)
+        given = DrawingRequest.of(venue, outcome.result, drawn_together(name), 1, needed)
         drawn = drawn_later(given, needed)
         assert set(drawn) == set(drawn_together(name))
         assert all(picture == outcome.pictures[each] for each, picture in drawn.items())
