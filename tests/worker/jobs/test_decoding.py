@@ -140,12 +140,6 @@ def test_a_frame_of_the_same_shape_is_resized_and_that_is_told(width, height):
     assert f"camera left sent {width}x{height} pixels, and its lens is for {size[0]}x{size[1]}" in remarks[0]
 
 
-def test_a_frame_of_another_shape_fails():
-    other = cv2.imencode(".png", SCENE[:, :-100])[1].tobytes()
-    with pytest.raises(JobFailedError, match="is of another shape: cropped, squeezed"):
-        decode_frame("left", SCENE.shape[1::-1], other)
-
-
 @pytest.mark.parametrize("bits", [10, 12, 14, 16])
 def test_the_values_of_a_sensor_are_read_in_their_range(bits):
     values = SCENE.astype(np.uint16) << (bits - 8)

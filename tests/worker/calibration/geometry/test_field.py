@@ -52,13 +52,6 @@ def test_corner_arcs_lie_inside_the_pitch():
         np.testing.assert_allclose(np.linalg.norm(np.abs(arc) - [52.5, 34], axis=1), 0.94)
 
 
-def test_both_halves_are_mirror_images():
-    points = PITCH.line_points().position[:, :2]
-    mirrored = points * [-1, 1]
-    distance = np.linalg.norm(points[:, None] - mirrored[None], axis=2).min(axis=1)
-    assert distance.max() < 0.13
-
-
 def test_the_roof_is_flat_at_the_boundary_and_highest_along_the_ridge():
     edge = np.array([[-52.5, 10], [52.5, -34], [0, 34], [20, -34], [60, 0], [0, 40]])
     np.testing.assert_allclose(CROWNED.height(edge), 0, atol=1e-12)
