@@ -52,7 +52,7 @@ class Drawings:
         if job is None or None in frames.values():
             return None
         files = {camera: frame for camera, frame in frames.items() if frame is not None}
-        asked = DrawingRequest.of(job.venue, job.result, [name], self._settings.threads, files)
+        asked = DrawingRequest.of(job.venue, job.result, drawn_together(name), self._settings.threads, files)
         program, environment = self._settings.picture_program, self._settings.native_environment
         output = run_program("picture", program, environment, encode_message(asked, files), LONGEST_S)
         drawn = decode_files(DrawnPictures.model_validate_json(output[: output.index(b"\n")]).sizes, output)
