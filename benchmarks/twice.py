@@ -164,7 +164,7 @@ def _life(focal: float, view: str, mistake: Mistake) -> list[Answer]:
         # As a search does it, too: the lens that the lines have is taken in its place.
         freed = refine(mistake.pitch, [found], sight, 0.0, free_lens(0, found)).each[0]
         found = with_sigmas(freed)
-        shift_px = shift_sigma_px(mistake.pitch, freed)
+        shift_px = shift_sigma_px(freed)
         (result,) = Installation(mistake.pitch, [found]).night(sight)
         is_sure = shift_px is not None and shift_px <= LEAST_SURE / 2 * found.intrinsics.size[0]
         result = result if is_sure else replace(result, refusal=Refusal("undetermined", "lens and pose slide together"))

@@ -11,8 +11,8 @@ from worker.calibration.detection.contrast import Channels
 from worker.calibration.detection.evidence import Evidence
 from worker.calibration.diagnostics.overlap import Overlap, overlap_of
 from worker.calibration.diagnostics.registration import Response
-from worker.calibration.geometry.camera import Camera, inside
-from worker.calibration.geometry.derivatives import POSE_NUMBERS, full_pixel_jacobian
+from worker.calibration.geometry.camera import Camera
+from worker.calibration.geometry.derivatives import POSE_NUMBERS
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.lens import SIGMA_NAMES
 from worker.calibration.geometry.parameters import LensParameter, free_lens_sigma
@@ -97,7 +97,7 @@ class FrameObservations:
         both = 2 * seen * explained / max(seen + explained, 1e-9)
         sigma = None if found.covariance is None else Sigma.from_covariance(found.covariance)
         overlap = overlap_of(self.field, found.camera, self.observations.responses[0])
-        shift_px = shift_sigma_px(self.field, found)
+        shift_px = shift_sigma_px(found)
         return Candidate(found.camera, both, explains, found.evidence, overlap, found.residual_px, sigma, shift_px)
 
 
@@ -131,12 +131,6 @@ def with_sigmas(found: RefinedPose) -> Camera:
     return found.camera.with_lens(replace(found.camera.intrinsics, sigma=known, sigma_from="lines"))
 
 
-def shift_sigma_px(field: Field, found: RefinedPose) -> float | None:
-    """Return the rms standard deviation (px) of the markings in view; None where none were measured."""
-    lines = field.line_points().position
-    in_view = lines[inside(found.camera.project(lines), found.camera.intrinsics.size)]
-    if found.refined is None or len(in_view) == 0:
-        return None
-    jacobian = full_pixel_jacobian(found.camera, in_view)
-    variances = np.einsum("nij,jk,nik->n", jacobian, found.refined.covariance, jacobian)
-    return float(np.sqrt(np.nanmean(variances)))
+def shift_sigma_px(found: RefinedPose) -> float | None:
+    """Return the rms standard deviation (px) of the markings in view by pose, lens and field; None without any."""
+    return None if found.ground_sigma is None else float(np.sqrt(np.nanmean(found.ground_sigma.pixels**2)))
