@@ -34,7 +34,7 @@ def commit() -> str | None:
 
 
 def description() -> str:
-    """Return version and commit for people: `0.2.0 (commit 76a150ef32b1)`."""
+    """Return version and commit for people: `0.3.0 (commit 76a150ef32b1)`."""
     known = commit()
     return version() if known is None else f"{version()} (commit {known[:12]})"
 

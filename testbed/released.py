@@ -20,7 +20,7 @@ from testbed.running import PROGRAM as OF_THIS_VERSION
 from testbed.running import Service
 
 ROOT = Path(__file__).parents[1]
-PROGRAM = "tests/e2e/program.py"
+PROGRAM = "testbed/program.py"
 DUMPS = ROOT / "tests" / "released" / "dumps"
 
 
