@@ -1,7 +1,5 @@
 """`esc calibrate` and `snapshot`: poses and frames by a service."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

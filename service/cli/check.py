@@ -1,7 +1,5 @@
 """`esc check`: is a calibration, whoever made it, still good on this picture? Without a venue and a service."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """`esc home`: copies of the database and the files of a service."""
 
-from __future__ import annotations
-
 import signal
 import sys
 from collections.abc import Callable, Iterator

@@ -1,7 +1,5 @@
 """`esc job`: jobs of a service."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """`esc intrinsics`, `pose` and `field fit`: lenses, first poses and the field before the first calibration."""
 
-from __future__ import annotations
-
 import json
 import re
 import secrets

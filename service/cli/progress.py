@@ -1,7 +1,5 @@
 """The progress bar of a command that waits for a calibration, here or in a service."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 

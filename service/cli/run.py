@@ -1,7 +1,5 @@
 """`esc run`: the calibration of a venue's file, without a service."""
 
-from __future__ import annotations
-
 import secrets
 from pathlib import Path
 from typing import Annotated

@@ -1,7 +1,5 @@
 """Changes of a venue by hand: losses by a file, patches of PART=VALUE, and an editor."""
 
-from __future__ import annotations
-
 import json
 import math
 import os

@@ -1,7 +1,5 @@
 """A camera as the formats take it: its numbers by name, and a check that a format can hold its lens."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from dataclasses import dataclass
 

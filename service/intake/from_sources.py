@@ -1,7 +1,5 @@
 """Calibrations whose frames the service fetches from the sources of the cameras."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
 

@@ -1,7 +1,5 @@
 """Frames from the sources of cameras, fetched by a program of the worker's: one that hangs is ended with it."""
 
-from __future__ import annotations
-
 import subprocess
 import tempfile
 import threading

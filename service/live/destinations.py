@@ -1,7 +1,5 @@
 """Destinations of live poses: datagrams to a renderer or a multicast group, and lines of JSON for programs."""
 
-from __future__ import annotations
-
 import json
 import select
 import socket

@@ -1,7 +1,5 @@
 """Stored poses, sent repeatedly at the rate of the pictures, with smooth transitions to newly accepted ones."""
 
-from __future__ import annotations
-
 import math
 import threading
 import time

@@ -1,7 +1,5 @@
 """Pages of jobs: the list with filters, and a job with its progress, numbers and pictures."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any, get_args
 
 from fastapi import APIRouter, Query, Request, Response

@@ -1,7 +1,5 @@
 """Rendering of pages from templates, with a strict Content-Security-Policy and problems as pages."""
 
-from __future__ import annotations
-
 import hashlib
 import re
 from collections.abc import Callable, Coroutine

@@ -1,7 +1,5 @@
 """Data of the trend charts of a camera: its movement at the far touchline and its focal length, night by night."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime

@@ -1,7 +1,5 @@
 """Jobs: their progress, results and decisions about them."""
 
-from __future__ import annotations
-
 from collections.abc import AsyncIterable, AsyncIterator, Callable
 from datetime import timedelta
 from http import HTTPStatus

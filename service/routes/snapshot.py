@@ -1,7 +1,5 @@
 """Frame of what a camera shows now, fetched from its source."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from fastapi import APIRouter, Response

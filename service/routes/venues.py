@@ -1,7 +1,5 @@
 """Venues: fields and their cameras, with the poses in use."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime, time
 from typing import Annotated, Any, Literal

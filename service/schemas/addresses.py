@@ -1,7 +1,5 @@
 """Types of addresses in requests: sources of frames and callback URLs; and parsing of IP addresses."""
 
-from __future__ import annotations
-
 import re
 from ipaddress import IPv4Address, IPv6Address, ip_address
 from typing import Annotated

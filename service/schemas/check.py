@@ -1,7 +1,5 @@
 """Result of a check of a calibration that anybody made: a grade for each camera, and the cause."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 from pydantic import Field

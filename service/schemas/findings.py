@@ -1,7 +1,5 @@
 """Validation errors of pydantic in words for people who write documents."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 from typing import Any, get_args

@@ -5,8 +5,6 @@ person stores one of these as a new revision. Calibrations offer theirs as long 
 searches as long as it stands as they began with it. Otherwise the offer is about other poses, or another field.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

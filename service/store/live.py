@@ -4,8 +4,6 @@ They are copied and backed up with all other tables: by the minutes it is seen w
 report says since when the process is missed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from datetime import datetime, timedelta

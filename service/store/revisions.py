@@ -1,7 +1,5 @@
 """History of venues as revisions, one for every state of their cameras: its pages, and how a venue was at one."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass

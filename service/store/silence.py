@@ -1,7 +1,5 @@
 """Silence: jobs that nothing was heard of for so long that whoever had them may be gone."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from datetime import datetime, timedelta
 

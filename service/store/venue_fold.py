@@ -4,8 +4,6 @@ A step takes the changes so far and returns them with its own; `with_alarms` com
 few steps: see `with_result_in_use` for an accepted calibration, `with_venue_put` for a PUT.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Venues, their changes and their restoration: all SQL about them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass

@@ -3,8 +3,6 @@
 A worker has a row by its name, and each of its starts a token in it: two workers of one name are told apart by that.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from dataclasses import dataclass
 from datetime import datetime, timedelta

@@ -4,8 +4,6 @@ Asked only of cameras whose lines are not seen where their stored poses put them
 if it passes the gate at that camera's stored pose with that camera's lens, as a frame of its own would.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 

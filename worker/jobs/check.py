@@ -1,7 +1,5 @@
 """Check of a calibration of any origin by frames of its cameras."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 

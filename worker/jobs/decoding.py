@@ -1,7 +1,5 @@
 """Files of frames and photos become pictures, a file that is damaged a failed job that names its camera."""
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Callable, Iterator, Sequence
 

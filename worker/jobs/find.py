@@ -1,7 +1,5 @@
 """A job of the kind `find`: from frames of cameras without poses to these cameras, and a picture of each candidate."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial

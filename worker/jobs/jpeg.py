@@ -7,8 +7,6 @@ the block before: what is lost in one makes all that follow too bright, too dark
 begins, a step runs along the edges of blocks for just one row's length.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 

@@ -1,7 +1,5 @@
 """Pictures of what the network saw of each frame, which nothing else can tell later."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

@@ -4,8 +4,6 @@
 leaves a `ClickedPose`.
 """
 
-from __future__ import annotations
-
 import sys
 import time
 from math import isfinite

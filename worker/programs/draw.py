@@ -4,8 +4,6 @@
 `Drawn` and the pictures.
 """
 
-from __future__ import annotations
-
 import logging
 import sys
 from collections.abc import Mapping

@@ -5,8 +5,6 @@ hold up every other request. Several API processes may draw the same picture at 
 the same name.
 """
 
-from __future__ import annotations
-
 import asyncio
 from contextlib import suppress
 from weakref import WeakValueDictionary

@@ -4,8 +4,6 @@ A package takes seconds of a core, and any key may ask for one. Of each key one 
 asks again and again does not keep the others out.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from service.api.programs.program_pool import ProgramPool

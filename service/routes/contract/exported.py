@@ -1,7 +1,5 @@
 """Export of poses to the formats of other tools, for venues and jobs."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass
 from importlib.metadata import version

@@ -1,7 +1,5 @@
 """Responses with entity tags: clients that have the content get 304 without it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Annotated, Any
 

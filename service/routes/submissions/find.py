@@ -1,7 +1,5 @@
 """Submission of searches: frames of cameras without poses become a job that finds these cameras."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 
 from fastapi import APIRouter, Request, Response

@@ -1,7 +1,5 @@
 """Upload forms: checks before they are read, their options and their frames."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import AsyncIterator, Collection
 from contextlib import asynccontextmanager

@@ -1,7 +1,5 @@
 """Submission of calibrations and field fits: frames are checked, stored, and queued as a job before the answer."""
 
-from __future__ import annotations
-
 from fastapi import APIRouter, Request, Response
 from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import FormData

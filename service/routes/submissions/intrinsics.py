@@ -1,7 +1,5 @@
 """Submission of lens calibrations: photos of a board become a job that finds the lens."""
 
-from __future__ import annotations
-
 from pathlib import PurePath
 
 from fastapi import APIRouter, Request, Response

@@ -1,7 +1,5 @@
 """Submission of first poses: clicked points become a job that finds the pose of a camera."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response

@@ -1,7 +1,5 @@
 """New jobs from the frames of old ones, beginning with the poses that are stored now."""
 
-from __future__ import annotations
-
 import hashlib
 
 from fastapi import APIRouter, Request, Response

@@ -1,7 +1,5 @@
 """Shortened URLs of callbacks in answers: anybody who knows the path of one may often post there."""
 
-from __future__ import annotations
-
 import hashlib
 import re
 from collections.abc import Collection

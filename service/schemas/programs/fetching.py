@@ -1,7 +1,5 @@
 """Outcome of fetching a frame from a source."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 

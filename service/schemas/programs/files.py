@@ -1,7 +1,5 @@
 """Concatenated files in a message of a program, whose first line has their sizes."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 

@@ -3,8 +3,6 @@
 Imports little: each fetch starts a process that loads this module.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from pydantic import BaseModel, Field

@@ -1,7 +1,5 @@
 """Request of the program that makes stitched views: a line of JSON, followed by frames."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 from pydantic import BaseModel

@@ -4,8 +4,6 @@ Every write of a worker carries the fencing token of its attempt (`run_token`) a
 cancelled or given to another attempt meanwhile.
 """
 
-from __future__ import annotations
-
 import uuid
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Submission: frames and options of a client become a job, or are found to be one already."""
 
-from __future__ import annotations
-
 import hashlib
 from datetime import datetime, timedelta
 from typing import Any

@@ -1,7 +1,5 @@
 """Histogram of the times that sources of cameras take to give a frame."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import structlog

@@ -4,8 +4,6 @@ A lens bends a ray, given by its undistorted image coordinates at depth 1 (x rig
 matrix makes pixels of those (pixel centres at integers). The models differ in how they bend alone.
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace

@@ -1,7 +1,5 @@
 """Verdict on a first pose: on each click, how sure the pose is, and what to do."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import comb

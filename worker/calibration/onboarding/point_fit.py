@@ -6,8 +6,6 @@ can be compared between fits that doubt different clicks, and with a term for ea
 BIC) between fits of different lenses.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import cached_property
 

@@ -1,7 +1,5 @@
 """Paper's search: the evolution strategy on the objective on the ground, from broad blurs to narrow ones."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Pictures by which a person judges a lens and a first pose: the evidence, and how well it fits."""
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 

@@ -1,7 +1,5 @@
 """Transparent pictures, BGRA, to be laid over a frame or the preview: what a person switches on and off to compare."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import cv2

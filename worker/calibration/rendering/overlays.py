@@ -1,7 +1,5 @@
 """The pitch drawn on a frame: by the stored pose and by the new one, each told from the other by its colour."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import cv2

@@ -1,7 +1,5 @@
 """Choice of the few pieces of line that tell most about a camera's pose: near and far, all over the picture."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -4,8 +4,6 @@ What comes is a `StitchRequest` and, for a picture, frames; what leaves is a zip
 JPEG.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 from collections.abc import Mapping
