@@ -6,8 +6,6 @@ the exponentially weighted moving average (EWMA), which shows where the mean is 
 caller's.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -45,7 +43,7 @@ class Baseline:
     unsure: float = 0.0
 
     @classmethod
-    def of(cls, nights: Sequence[Night]) -> Baseline:
+    def of(cls, nights: Sequence[Night]) -> "Baseline":
         """Estimate the baseline from the first nights, robust against outliers."""
         first = nights[:NIGHTS_OF_BASELINE]
         values = [night.value for night in first]

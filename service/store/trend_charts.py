@@ -4,8 +4,6 @@ Nights are days of UTC. Where a schedule calibrates many times a day, the mean o
 and lets it cool again, which is no trend.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from datetime import datetime
@@ -76,7 +74,7 @@ class CameraCharts:
     series: Sequence[Series]
 
     @classmethod
-    def of(cls, rows: Rows, settled: Mapping[str, Baseline]) -> CameraCharts:
+    def of(cls, rows: Rows, settled: Mapping[str, Baseline]) -> "CameraCharts":
         """Chart the rows since an anchor, oldest first; `settled`: the baselines that are known for good."""
         nights = [list(several) for _, several in groupby(rows, lambda row: row.at.date())]
         return cls(nights, [_series(quantity, nights, settled.get(quantity)) for quantity in QUANTITIES])

@@ -4,8 +4,6 @@ Lens, paint and ground put each piece of line a little beside where the model ha
 is learned, piece by piece, while the clip runs: otherwise the pose would jump whenever a player hides some of them.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,7 +50,7 @@ class LineObservations:
     jacobian: Array
     share: float
 
-    def __getitem__(self, chosen: NDArray[np.bool_]) -> LineObservations:
+    def __getitem__(self, chosen: NDArray[np.bool_]) -> "LineObservations":
         return take_rows(self, chosen)
 
 
