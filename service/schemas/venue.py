@@ -1,6 +1,6 @@
 """Models of a venue in requests and answers: a pitch and the cameras around it."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Annotated, Any, Literal, Self, TypeVar
 
 from pydantic import AfterValidator, ConfigDict, Field, model_validator
@@ -193,6 +193,11 @@ class VenueSettings(NamedField):
         None, description="Settings of its stitched view; null: chosen to suit the cameras."
     )
 
+    def with_cameras(self, parts: Mapping[str, Mapping[str, Any]], **others: Any) -> Self:
+        """Return the venue with other `parts` of the named cameras, and with `others` of its own."""
+        cameras = [camera.model_copy(update=parts.get(camera.id)) for camera in self.cameras]
+        return self.model_copy(update={"cameras": cameras, **others})
+
 
 class VenueIn(VenueSettings):
     """A venue in a request."""
@@ -286,11 +291,6 @@ class Venue(VenueSettings):
         webhooks = [webhook.model_copy(update={"url": change(webhook.url)}) for webhook in self.webhooks]
         return self.model_copy(update={"alarms": changed(self.alarms), "schedule": schedule, "webhooks": webhooks})
 
-    def with_poses(self, poses: dict[str, Pose]) -> "Venue":
-        """Return the venue with other poses of the named cameras."""
-        cameras = [camera.model_copy(update={"pose": poses.get(camera.id, camera.pose)}) for camera in self.cameras]
-        return self.model_copy(update={"cameras": cameras})
-
     def to_input(self) -> VenueIn:
         """Return the venue as a request has it."""
         once = {"cameras": {"__all__": {"pose": {"translation"}}}}
@@ -310,7 +310,9 @@ class Venue(VenueSettings):
 
     def accepts_frames_of(self, other: "Venue") -> bool:
         """True if frames of the other can be calibrated here: same field, cameras and lenses, whatever their poses."""
-        return self.has_same_calibration_input_as(other.with_poses(self.poses))
+        return self.has_same_calibration_input_as(
+            other.with_cameras({camera: {"pose": pose} for camera, pose in self.poses.items()})
+        )
 
 
 class ChangedVenue(Venue):

@@ -73,21 +73,17 @@ def with_result(venue: Venue, result: Result, cameras: Collection[str] | None = 
 
     `cameras`: only theirs; None: those of all.
     """
-    found = {camera.id: camera for camera in result.cameras if cameras is None or camera.id in cameras}
-    cameras_found = [
-        camera.model_copy(
-            update={
-                "pose": found[camera.id].pose,
-                "intrinsics": found[camera.id].intrinsics or camera.intrinsics,
-                "light": found[camera.id].light or camera.light,
-            }
-        )
-        if camera.id in found
-        else camera
-        for camera in venue.cameras
-    ]
+    found = {
+        camera.id: {
+            name: part
+            for name, part in (("pose", camera.pose), ("intrinsics", camera.intrinsics), ("light", camera.light))
+            if part is not None
+        }
+        for camera in result.cameras
+        if cameras is None or camera.id in cameras
+    }
     field = venue.field if result.ridge is None else venue.field.model_copy(update={"ridge": result.ridge})
-    return venue.model_copy(update={"cameras": cameras_found, "field": field})
+    return venue.with_cameras(found, field=field)
 
 
 def with_misses(changes: Changes, cameras: Collection[str]) -> Changes:
