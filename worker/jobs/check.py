@@ -16,9 +16,9 @@ from worker.calibration.checking.grade import GradedCamera, grade
 from worker.calibration.geometry import camera as engine
 from worker.calibration.geometry.lens import Lens
 from worker.compute_resources import ComputeResources
-from worker.jobs.decoding import decode_frame, decode_frame_of_any_size
+from worker.jobs.decoding import decode_frames, size_of
 from worker.jobs.documents import Progress
-from worker.jobs.from_schemas import JobFailedError, Picture, lens_of, pitch_of
+from worker.jobs.from_schemas import JobFailedError, lens_of, pitch_of
 from worker.jobs.to_schemas import engine_failures, lens_to_schema, load_segmenter, pose_to_schema, progress_to_schema
 
 
@@ -43,23 +43,12 @@ def solve(
     """Return the grade of each camera by the files of its frames. Raises `JobFailedError` for frames of no use."""
     segmenter = load_segmenter(means)
     cv2.setNumThreads(means.threads)
-    frames = {camera.id: _decode(camera.id, files[camera.id]) for camera in cameras}
-    given = [_given(camera, _size(frames[camera.id][0])) for camera in cameras]
+    frames = {camera.id: decode_frames(camera.id, None, files[camera.id]) for camera in cameras}
+    given = [_given(camera, size_of(frames[camera.id][0])) for camera in cameras]
     pitch = pitch_of(field)
     with engine_failures():
         checked = check_cameras(pitch, given, frames, segmenter, seed, lambda step: report(progress_to_schema(step)))
     return [_to_schema(grade(pitch, one, _folds(one.meant.intrinsics))) for one in checked]
-
-
-def _decode(camera: str, files: Sequence[bytes]) -> list[Picture]:
-    """Return the frames of a camera, all of the size of the first."""
-    first = decode_frame_of_any_size(camera, files[0])
-    return [first, *(decode_frame(camera, first.shape[1::-1], file) for file in files[1:])]
-
-
-def _size(frame: Picture) -> tuple[int, int]:
-    height, width = frame.shape[:2]
-    return width, height
 
 
 def _given(camera: CheckedInput, size: tuple[int, int]) -> GivenCamera:
