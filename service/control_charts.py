@@ -61,12 +61,11 @@ class Baseline:
 class ChartPoint:
     """State of both charts after a night, in standard deviations from the centre.
 
-    `standardised`: the value itself; `limit`: limit of the EWMA, which widens from night to night; `high` and `low`:
-    the CUSUM's upward and downward sums, 0 or more; `since`: index of the night since which the larger sum has been
-    above 0, the estimated beginning of the shift; None while both are 0.
+    `limit`: limit of the EWMA, which widens from night to night; `high` and `low`: the CUSUM's upward and downward
+    sums, 0 or more; `since`: index of the night since which the larger sum has been above 0, the estimated beginning of
+    the shift; None while both are 0.
     """
 
-    standardised: float
     ewma: float
     limit: float
     high: float
@@ -104,7 +103,7 @@ def charted(nights: Iterable[Night | None], baseline: Baseline) -> Iterator[Char
         slack = SLACK_SIGMA + baseline.unsure
         high, low = max(0.0, high + standardised - slack), max(0.0, low - standardised - slack)
         since = None if high == low == 0 else high_since if high >= low else low_since
-        yield ChartPoint(standardised, ewma, ewma_limit(measured, baseline.unsure), high, low, since)
+        yield ChartPoint(ewma, ewma_limit(measured, baseline.unsure), high, low, since)
 
 
 def ewma_limit(nights: int, unsure: float = 0.0) -> float:

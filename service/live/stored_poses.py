@@ -89,19 +89,18 @@ def send_stored_poses(
     rate: Fraction,
     stop: threading.Event,
     is_tracked: Callable[[str], bool] = lambda _: False,
-) -> int:
-    """Send a sample of each camera `rate` times a second until `stop`; return the number of beats.
+) -> None:
+    """Send a sample of each camera `rate` times a second until `stop`.
 
     The beat follows the machine's clock without drift. Tracked cameras are left out.
     """
-    sent, begun, beats = 0, time.monotonic(), 0
+    begun, beats = time.monotonic(), 0
     while not stop.is_set():
         stored = [shot for shot in poses.at(time.monotonic()) if not is_tracked(shot.id)]
         if stored:
             sender.send(stored, time.time_ns(), rate, STORED)
-        sent, beats = sent + 1, beats + 1
+        beats += 1
         wait_s = begun + float(beats / rate) - time.monotonic()
         if wait_s < -MOST_MISSED_S:
             begun, beats, wait_s = time.monotonic(), 0, 0.0
         stop.wait(max(wait_s, 0.0))
-    return sent
