@@ -12,8 +12,7 @@ from pydantic import ValidationError
 from service import child_process
 from service.intake import image_checks
 from service.schemas.problems import Problem
-from service.schemas.programs.fetching import SourceFetch
-from service.schemas.programs.sources import SourceAnswer, SourceTask, frame_file, longest_s
+from service.schemas.programs.sources import SourceAnswer, SourceFetch, SourceTask, frame_file, longest_s
 from service.schemas.source_urls import SourceSecrets
 from service.schemas.venue import Camera
 from service.settings import Settings

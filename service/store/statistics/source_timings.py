@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import structlog
 
-from service.schemas.programs.fetching import SourceFetch
+from service.schemas.programs.sources import SourceFetch
 from service.store.database import DATABASE_OUTAGES, Repository, writing
 from service.store.statistics import counters
 from service.store.statistics.counters import HistogramBuckets
