@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal, Self, TypeVar
 from pydantic import AfterValidator, ConfigDict, Field, model_validator
 
 from service.schemas import source_urls
-from service.schemas.addresses import HIDDEN, SourceUrl
+from service.schemas.addresses import HIDDEN, SourceUrl, hide_path, restore_url
 from service.schemas.base import (
     OPEN_WORD,
     UNREADABLE,
@@ -18,7 +18,6 @@ from service.schemas.base import (
     is_empty,
     is_none,
 )
-from service.schemas.events import hidden_urls
 from service.schemas.events.webhooks import WEBHOOK_EXAMPLE, Webhook
 from service.schemas.field import FieldOfPlay
 from service.schemas.geometry import Light, Pose, PosedCamera, PoseIn, UnposedCamera, check_lens
@@ -275,12 +274,12 @@ class Venue(VenueSettings):
 
     def with_hidden_callbacks(self) -> Self:
         """Return the venue for an answer: URLs of callbacks are shortened, since their paths may be secret."""
-        return self._with_callbacks(hidden_urls.hide_path)
+        return self._with_callbacks(hide_path)
 
     def with_callbacks_of(self, before: "Venue | None") -> Self:
         """Return the venue with shortened URLs of callbacks replaced by the full ones that it had before."""
         known = [] if before is None else before.callbacks
-        return self._with_callbacks(lambda url: hidden_urls.restore_url(url, known))
+        return self._with_callbacks(lambda url: restore_url(url, known))
 
     def _with_callbacks(self, change: Callable[[str], str]) -> Self:
         def changed(part: T) -> T:
