@@ -97,7 +97,8 @@ def charted(nights: Iterable[Night | None], baseline: Baseline) -> Iterator[Char
             yield None
             continue
         measured += 1
-        standardised = (night.value - baseline.centre) / _above_zero(baseline.spread(night))
+        # A series without any spread would divide by zero.
+        standardised = (night.value - baseline.centre) / max(baseline.spread(night), 1e-12)
         ewma += WEIGHT * (standardised - ewma)
         high_since, low_since = number if high == 0 else high_since, number if low == 0 else low_since
         slack = SLACK_SIGMA + baseline.unsure
@@ -120,8 +121,3 @@ def hodges_lehmann(values: Sequence[float]) -> float:
     Hodges and Lehmann, "Estimates of Location Based on Rank Tests", 1963.
     """
     return median((a + b) / 2 for a, b in combinations_with_replacement(values, 2))
-
-
-def _above_zero(spread: float) -> float:
-    # A series without any spread would divide by zero.
-    return max(spread, 1e-12)

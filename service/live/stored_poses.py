@@ -63,8 +63,8 @@ class StoredPoses:
         """Begin transitions to the poses of a venue. Return the ids of cameras whose poses or lenses are new."""
         with self._lock:
             before = {camera: transition.at(now) for camera, transition in self._transitions.items()}
-            stored = {camera: transition.after for camera, transition in self._transitions.items()}
-            new = [camera.id for camera in venue.cameras if not _is_alike(stored.get(camera.id), camera)]
+            stored = {id: (one.after.pose, one.after.intrinsics) for id, one in self._transitions.items()}
+            new = [one.id for one in venue.cameras if stored.get(one.id) != (one.pose, one.intrinsics)]
             self._transitions = {
                 camera.id: _Transition(before.get(camera.id, camera), camera, now)
                 if camera.id in new
@@ -77,10 +77,6 @@ class StoredPoses:
         """Return the cameras at a time (`time.monotonic`), in the order of the venue."""
         with self._lock:
             return [NumberedCamera(one.at(now), number) for number, one in enumerate(self._transitions.values(), 1)]
-
-
-def _is_alike(stored: Camera | None, camera: Camera) -> bool:
-    return stored is not None and stored.pose == camera.pose and stored.intrinsics == camera.intrinsics
 
 
 def send_stored_poses(

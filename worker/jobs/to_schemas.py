@@ -173,7 +173,7 @@ def camera_to_schema(found: quality.CameraResult) -> CameraResult:
         residual_px=finite_or_none(found.residual_px),
         markings=[_marking(one) for one in found.markings],
         knocked=found.knocked,
-        proposed=_proposal(found) if _is_proposed(found) else None,
+        proposed=_proposal(found),
         cross_check=_cross_check(found.cross_checked()),
     )
 
@@ -182,11 +182,9 @@ def _moved(found: quality.Moved) -> Moved:
     return Moved(rotation_deg=found.rotation_deg, position_m=found.position_m, pixels=finite_or_none(found.pixels))
 
 
-def _is_proposed(found: quality.CameraResult) -> bool:
-    return found.refusal is not None and found.refusal.reason == "knocked"
-
-
-def _proposal(found: quality.CameraResult) -> Proposal:
+def _proposal(found: quality.CameraResult) -> Proposal | None:
+    if found.refusal is None or found.refusal.reason != "knocked":
+        return None
     return Proposal(
         pose=pose_to_schema(found.camera.pose),
         sigma=sigma_to_schema(found.sigma, found.ground_sigma),

@@ -73,11 +73,6 @@ async def parsed_upload(request: Request, context: Context, most_files: int) -> 
         yield await parsed_form(request, spool, files, PARTS_TOO_MANY, LONGEST_OPTIONS)
 
 
-def most_frames(context: Context, venue: Venue) -> int:
-    """Return the number of frames that the cameras of a venue may have together."""
-    return len(venue.cameras) * context.settings.max_frames_per_camera
-
-
 def parse_options(form: FormData, model: type[Chosen], settings: Settings) -> Chosen:
     """Return the part `options` of a form, or the default options without one."""
     options = parse_part(form, OPTIONS_PART, model, absent="{}")

@@ -60,7 +60,8 @@ async def _uploaded(
     stored = await run_in_threadpool(forms.venue_for_upload, context, venue_id)
     kind: JobKind = "calibration" if model is Options else "field"
     await run_in_threadpool(job_submission.require_queue_room, context, stored.id, kind, sender)
-    async with forms.parsed_upload(request, context, forms.most_frames(context, stored)) as form:
+    most = len(stored.cameras) * context.settings.max_frames_per_camera
+    async with forms.parsed_upload(request, context, most) as form:
         return await run_in_threadpool(submit, context, stored, form, model, sender)
 
 
