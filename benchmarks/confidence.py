@@ -18,6 +18,7 @@ import argparse
 import zlib
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
 
@@ -58,6 +59,7 @@ def main() -> None:
     parser.add_argument("--folder", type=Path, nargs="+", default=[real.FOLDER], help="of real frames, with cases.json")
     parser.add_argument("--fields", nargs="+", choices=NAMES, default=list(NAMES), help="templates to render")
     parser.add_argument("--views", type=int, default=40, help="rendered, of each template")
+    parser.add_argument("--starts", type=int, default=5, help="for each rendered view")
     parser.add_argument("--rows", type=Path, default=RUNS / "confidence.jsonl", help="the file of what has been run")
     options = parser.parse_args()
     cv2.setNumThreads(1)
@@ -73,9 +75,13 @@ def main() -> None:
 
 def _rendered(options: argparse.Namespace, engine: Engine) -> list[dict]:
     return [
-        engine.rows.remembered({"rendered": name, "view": view, "model": engine.name}, _from_start, name, view, engine)
+        engine.rows.remembered(
+            {"rendered": name, "view": view, "start": start, "model": engine.name},
+            *(_from_start, name, view, start, engine),
+        )
         for view in range(options.views)
         for name in options.fields
+        for start in range(options.starts)
     ]
 
 
@@ -143,14 +149,20 @@ def _reliability(rows: Sequence[dict]) -> Iterator[str]:
         yield f"| {least:g} to {min(most, 1):g} | {' | '.join(cells)} | {len(accepted)} | {wrong} |"
 
 
-def _from_start(name: str, view: int, engine: Engine) -> dict:
+@lru_cache(maxsize=1)
+def _view(name: str, number: int) -> Shot:
+    """Render a view, once for all of its starts."""
+    return shot(name, number)
+
+
+def _from_start(name: str, view: int, start: int, engine: Engine) -> dict:
     """Return the row of a rendered view from a start that is off, spoiled or not."""
     # Views that no other bench renders, so that numbers are chosen and judged on pictures of their own.
     number = 3000 + view
-    taken = shot(name, number)
-    rng = np.random.default_rng([zlib.crc32(name.encode()), number])
+    taken = _view(name, number)
+    rng = np.random.default_rng([zlib.crc32(name.encode()), number, start])
     turn_deg = float(np.exp(rng.uniform(np.log(LEAST_DEG), np.log(MOST_DEG))))
-    (stored,) = started([taken.camera], name, number, turn_deg, min(METRES_PER_DEGREE * turn_deg, MOST_M))
+    (stored,) = started([taken.camera], name, 100 * number + start, turn_deg, min(METRES_PER_DEGREE * turn_deg, MOST_M))
     spoiled = str(rng.choice(list(SPOILED), p=list(SPOILED.values())))
     frame, stored, true = _spoil(spoiled, name, taken, stored, rng)
     row = _answer(taken.pitch, stored, frame, view, true, engine)

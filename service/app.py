@@ -24,7 +24,7 @@ from service.routes import docs, event_streams, health, jobs, live, pictures, sn
 from service.routes.contract import document
 from service.routes.contract.introduction import DESCRIPTION, TAGS
 from service.routes.contract.problem_docs import OF_ANY_ROUTE
-from service.routes.submissions import find, frames, intrinsics, locate, resubmit
+from service.routes.submissions import check, find, frames, intrinsics, locate, resubmit
 from service.schemas.problems import Problem
 from service.settings import Settings
 from service.store.blobs import BLOB_OUTAGES
@@ -82,6 +82,7 @@ def all_routes() -> Sequence[BaseRoute]:
         intrinsics,
         locate,
         find,
+        check,
         jobs,
         resubmit,
         pictures,

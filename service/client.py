@@ -43,6 +43,7 @@ from service.schemas.job import Job, Jobs
 from service.schemas.live import LiveHistory, LiveReport, LiveState
 from service.schemas.merge_patch import MEDIA_TYPE as MERGE_PATCH
 from service.schemas.names import (
+    CALIBRATION_PART,
     OPTIONS_PART,
     SITE_PART,
     EventKind,
@@ -69,6 +70,7 @@ PACKAGE_S = 180.0
 # A report is out of date by then.
 REPORT_S = 5.0
 NOTHING: Mapping[str, Any] = MappingProxyType({})
+OCTETS = "application/octet-stream"
 Answer = TypeVar("Answer", bound=BaseModel)
 
 
@@ -298,6 +300,18 @@ class AsyncClient:
             sent["files"].append((SITE_PART, ("site.json", document, "application/json")))
         return await self._call(Job, "POST", f"/venues/{venue_id}/find", **sent)
 
+    async def check(
+        self,
+        calibration: Sequence[Path],
+        files: Mapping[str, Path | Sequence[Path]],
+        options: Mapping[str, Any],
+        idempotency_key: str | None = None,
+    ) -> Job:
+        """Submit the files of a calibration of any tool, and frames of its cameras; `options` say the field."""
+        sent = _upload(files, options, idempotency_key)
+        sent["files"] += [(CALIBRATION_PART, (path.name, path.read_bytes(), OCTETS)) for path in calibration]
+        return await self._call(Job, "POST", "/check", **sent)
+
     async def job(self, job_id: str, wait_s: float = 0) -> Job:
         """Return a job, at its end or after `wait_s`."""
         params = {"wait": wait_s} if wait_s else {}
@@ -469,6 +483,7 @@ class Client:
     calibrate = blocking(AsyncClient.calibrate)
     fit_field = blocking(AsyncClient.fit_field)
     find = blocking(AsyncClient.find)
+    check = blocking(AsyncClient.check)
     job = blocking(AsyncClient.job)
     jobs = blocking(AsyncClient.jobs)
     again = blocking(AsyncClient.again)
@@ -530,7 +545,7 @@ def _upload(
     files: Mapping[str, Path | Sequence[Path]], options: Mapping[str, Any], idempotency_key: str | None
 ) -> dict[str, Any]:
     parts: list[tuple[str, tuple[str, bytes, str]]] = [
-        (camera, (path.name, path.read_bytes(), "application/octet-stream"))
+        (camera, (path.name, path.read_bytes(), OCTETS))
         for camera, paths in files.items()
         for path in ([paths] if isinstance(paths, Path) else paths)
     ]

@@ -101,6 +101,8 @@ def answer(task: dict, with_frames: list[str]) -> dict:
         sought = sought_cameras(task, with_frames)
         pictures = [f"candidate_{camera}_{number}" for camera in sought for number in (1, 2)]
         return done(found_cameras(sought, behaviour, task), pictures)
+    if task["kind"] == "check":
+        return done(checked(task["options"]), [])
     if task["kind"] not in ("calibration", "field"):
         return failed("no-pose", "This program only moves cameras.")
     cameras = task["venue"]["cameras"]
@@ -187,6 +189,24 @@ def found_cameras(sought: list[str], behaviour: str, task: dict) -> dict:
         "stitch_error_px": 0.4,
         "timings_s": {"evolution": 0.1},
         "provenance": {"software": "0", "model_sha256": "0", "seed": task["options"]["seed"], "options": {}},
+    }
+
+
+def checked(given: dict) -> dict:
+    """Grades of the cameras of a file: of several, the first is good and the others are turned."""
+    unknown = dict.fromkeys(("off_px", "sigma_px", "off_m", "sigma_m", "detail", "pose", "intrinsics"))
+    known = {"image_size": [64, 48], **unknown}
+    good = {"grade": "good", "causes": [], "off_px": 0.4, "sigma_px": 0.3}
+    turned = {"grade": "drifted", "causes": [{"cause": "turned", "detail": "turned by 0.6 degrees"}], "off_m": 0.7}
+    cameras = [known | {"id": one["id"]} | (turned if number else good) for number, one in enumerate(given["cameras"])]
+    return {
+        "kind": "check",
+        "grade": cameras[-1]["grade"],
+        "format": given["format"],
+        "field": given["field"],
+        "cameras": cameras,
+        "timings_s": {"check": 0.1},
+        "software": "0",
     }
 
 

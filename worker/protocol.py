@@ -12,6 +12,7 @@ from typing import IO, Any, assert_never
 
 from pydantic import BaseModel
 
+from service.schemas.check import CheckResult
 from service.schemas.job import JobError, Progress
 from service.schemas.results import AnyResult, FieldResult, FindResult, IntrinsicsResult, LocateResult, Result
 from service.store.jobs.task import Task
@@ -68,6 +69,8 @@ class Message(BaseModel):
                 return self.result.verdict
             case IntrinsicsResult():
                 return "found"
+            case CheckResult():
+                return self.result.grade
             case LocateResult() | FindResult() | FieldResult():
                 return "accepted" if self.result.accepted else "rejected"
             case _ as unknown:
@@ -83,6 +86,8 @@ class Message(BaseModel):
             case Result() | FindResult() as found:
                 named = {"cameras": [camera.id for camera in found.cameras if not camera.accepted]}
                 named["why"] = found.rejected_because
+            case CheckResult() as checked:
+                named = {"cameras": [*checked.failing], "why": "; ".join(checked.failing.values())}
             case LocateResult() | FieldResult() as found:
                 named = {"why": found.rejected_because}
         return {"verdict": self.verdict} | {name: value for name, value in named.items() if value}

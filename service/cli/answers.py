@@ -7,8 +7,9 @@ from pathlib import Path
 
 from pydantic import BaseModel
 
-from service.cli.printing import ACCEPTED, FAILED, REJECTED, print_note, print_rows
+from service.cli.printing import ACCEPTED, CANNOT_TELL, FAILED, REJECTED, print_note, print_rows
 from service.client import Client
+from service.schemas.check import CheckResult, Grade
 from service.schemas.health import VenueHealth
 from service.schemas.job import Job
 from service.schemas.results import (
@@ -148,8 +149,21 @@ def job_exit_code(job: Job) -> int:
             return FAILED
         case IntrinsicsResult():
             return ACCEPTED
+        case CheckResult(grade=grade):
+            return exit_code_of_grade(grade)
         case result:
             return ACCEPTED if result.accepted else REJECTED
+
+
+def exit_code_of_grade(grade: Grade) -> int:
+    """Return the exit code for the grade of a calibration."""
+    match grade:
+        case "good":
+            return ACCEPTED
+        case "cannot-tell":
+            return CANNOT_TELL
+        case _:
+            return REJECTED
 
 
 def print_outcome(job: Job) -> None:
@@ -175,6 +189,9 @@ def _print_result(result: BaseModel) -> None:
         case IntrinsicsResult():
             print_lens_summary(result)
             return
+        case CheckResult():
+            print_checks(result)
+            return
         case LocateResult():
             print_pose_summary(result)
             return
@@ -192,6 +209,8 @@ def outcome_text(job: Job) -> str:
         return f"{job.error.title}: {job.error.detail}"
     if job.result is None or isinstance(job.result, IntrinsicsResult):
         return "-"
+    if isinstance(job.result, CheckResult):
+        return "; ".join([job.result.grade, *(f"{id}: {why}" for id, why in job.result.failing.items())])
     if isinstance(job.result, Result) and job.result.verdict == "partly":
         return f"partly: {', '.join(job.result.accepted_cameras)} accepted; {job.result.rejected_because}"
     return "accepted" if job.result.accepted else f"rejected: {job.result.rejected_because}"
@@ -217,6 +236,24 @@ def print_lens_summary(result: IntrinsicsResult) -> None:
                 print_note(f"  {photo.name} {words}")
     for warning in result.warnings:
         print_note(f"Warning: {warning}")
+
+
+def print_checks(result: CheckResult) -> None:
+    """Print the grade of each camera, how far it is off, and why."""
+    rows = [
+        [one.id, one.grade.replace("-", " "), _within(one.off_px, one.sigma_px, 1), _within(one.off_m, one.sigma_m, 2)]
+        + [result.failing.get(one.id, "-")]
+        for one in result.cameras
+    ]
+    print_rows(["CAMERA", "GRADE", "OFF, PX", "OFF, M ON THE GROUND", "CAUSE"], rows)
+    for warning in result.warnings:
+        print_note(f"Warning: {warning}")
+
+
+def _within(value: float | None, sigma: float | None, digits: int) -> str:
+    if value is None:
+        return "-"
+    return f"{value:.{digits}f}" + ("" if sigma is None else f" ± {sigma:.{digits}f}")
 
 
 def print_pose_summary(result: LocateResult) -> None:

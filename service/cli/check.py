@@ -3,25 +3,21 @@
 import json
 import re
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from service.cli.answers import print_json
+from service.cli.answers import exit_code_of_grade, print_checks, print_json
 from service.cli.arguments import parse_document, parse_frame_files
-from service.cli.convert import chosen_cameras, read_calibration, write_calibration
+from service.cli.convert import read_calibration, write_calibration
 from service.cli.local_engine import engine_progress, engine_settings, report_job_failures
-from service.cli.printing import ACCEPTED, REJECTED, USAGE, fail, print_note, print_rows
+from service.cli.printing import USAGE, fail, print_note
 from service.formats.reading import CalibrationFile
 from service.formats.records import CameraRecord
 from service.intake import image_checks
-from service.schemas.check import GRADES, CameraCheck, CheckResult
+from service.schemas.check import CameraCheck, CheckedFile
 from service.schemas.field import FieldOfPlay
-
-CANNOT_TELL = 4
-EXIT_CODES = {"good": ACCEPTED, "drifted": REJECTED, "wrong": REJECTED, "cannot-tell": CANNOT_TELL}
 
 
 def check(
@@ -68,26 +64,24 @@ def check(
         fail(f"There is no file {', '.join(map(str, missing))}", USAGE)
     field = _parse_field(sport, size, site or paths[0])
     found = read_calibration(paths)
-    cameras = _cameras_with_frames(found, list(files))
     with report_job_failures():
+        cameras = found.with_frames(list(files))
         for name, images in files.items():
             for data in images:
-                image_checks.check_photo(name, data, settings)
+                image_checks.check_frame(name, data, settings)
     from worker.compute_resources import ComputeResources
     from worker.jobs import check as checking
 
-    inputs = [checking.CheckedInput(one.id, one.intrinsics, one.size, one.pose) for one in cameras]
+    given = CheckedFile(field=field, seed=seed, format=found.format, cameras=[one.to_check for one in cameras])
     with engine_progress() as show:
-        checks = checking.solve(field, inputs, files, seed, ComputeResources.of(settings), show)
-    worst = next(grade for grade in GRADES if any(one.grade == grade for one in checks))
-    result = CheckResult(grade=worst, format=found.format, field=field, cameras=checks)
+        result = checking.solve(given, files, ComputeResources.of(settings), show).result
     if as_json:
         print_json(result)
     else:
-        _print_table(checks)
+        print_checks(result)
     if output is not None:
-        _write_corrected(found, cameras, checks, output)
-    raise typer.Exit(EXIT_CODES[worst])
+        _write_corrected(found, cameras, result.cameras, output)
+    raise typer.Exit(exit_code_of_grade(result.grade))
 
 
 def _parse_field(sport: str | None, size: str | None, site: Path) -> FieldOfPlay:
@@ -113,28 +107,6 @@ def _field_of(site: Path) -> Any:
     except ValueError:
         return None
     return document.get("field") if isinstance(document, dict) else None
-
-
-def _cameras_with_frames(found: CalibrationFile, named: Sequence[str]) -> list[CameraRecord]:
-    """Return the cameras that frames are given of; the only camera of a file has any name."""
-    if len(found.cameras) == 1 and len(named) == 1:
-        return [replace(found.cameras[0], id=named[0])]
-    return chosen_cameras(found, list(named))
-
-
-def _print_table(checks: Sequence[CameraCheck]) -> None:
-    rows = [
-        [one.id, one.grade.replace("-", " "), _within(one.off_px, one.sigma_px, 1), _within(one.off_m, one.sigma_m, 2)]
-        + ["; ".join(cause.detail for cause in one.causes) or one.detail or "-"]
-        for one in checks
-    ]
-    print_rows(["CAMERA", "GRADE", "OFF, PX", "OFF, M ON THE GROUND", "CAUSE"], rows)
-
-
-def _within(value: float | None, sigma: float | None, digits: int) -> str:
-    if value is None:
-        return "-"
-    return f"{value:.{digits}f}" + ("" if sigma is None else f" ± {sigma:.{digits}f}")
 
 
 def _write_corrected(

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
-ACCEPTED, FAILED, USAGE, REJECTED, BUSY = 0, 1, 2, 3, 75
+ACCEPTED, FAILED, USAGE, REJECTED, CANNOT_TELL, BUSY = 0, 1, 2, 3, 4, 75
 ZIP_START = b"PK"
 
 

@@ -2,15 +2,16 @@
 
 import io
 import zipfile
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from service.formats.nodes import FileRefusedError
-from service.formats.parsing import MOST_BYTES_OF_COLMAP, ParsedFile, parse_file
+from service.formats.parsing import MOST_BYTES, MOST_BYTES_OF_COLMAP, ParsedFile, parse_file
 from service.formats.records import CameraRecord, with_distinct_ids
 from service.formats.table import FILE_FORMATS
-from service.schemas.names import FormatName
+from service.schemas.names import FormatName, id_like
+from service.schemas.problems import Problem
 
 ZIP_START = b"PK\x03\x04"
 MOST_FILES = 1000
@@ -34,6 +35,25 @@ class CalibrationFile:
     format: FormatName
     cameras: list[CameraRecord]
 
+    def with_frames(self, names: Sequence[str]) -> list[CameraRecord]:
+        """Return the cameras of these names; the only camera of a file has any one name.
+
+        Raises the problem `unknown-camera`.
+        """
+        if len(self.cameras) == len(names) == 1 and id_like(names[0]) == names[0]:
+            return [replace(self.cameras[0], id=names[0])]
+        known = [one.id for one in self.cameras]
+        for name in names:
+            if name not in known:
+                raise Problem(
+                    "unknown-camera",
+                    f"The calibration has the cameras {', '.join(known)} and no {name[:64]!r}; name each frame by its "
+                    "camera.",
+                    camera=name[:64],
+                    expected=known,
+                )
+        return [one for one in self.cameras if one.id in names]
+
 
 def read_paths(paths: list[Path]) -> CalibrationFile:
     """Return the cameras of files, folders and zips. Raises `FileRefusedError`, or `OSError` if there is no file."""
@@ -47,12 +67,23 @@ def read_paths(paths: list[Path]) -> CalibrationFile:
             if not found:
                 raise FileRefusedError(str(path), "", "a folder with calibration files", "none")
         elif zipfile.is_zipfile(path):
-            members = _unzipped(str(path), _read_limited(path))
+            members = _unzipped(str(path), _read_limited(path), MOST_BYTES_OF_COLMAP)
             files |= members
             optional |= members.keys()
         else:
             files[str(path)] = _read_limited(path)
     return read_files(files, frozenset(optional))
+
+
+def read_uploads(uploads: Mapping[str, bytes]) -> CalibrationFile:
+    """Return the cameras of files and zips as somebody sends them. Raises `FileRefusedError`.
+
+    Of several, some may be no calibration: tools write files without cameras beside it.
+    """
+    files: dict[str, bytes] = {}
+    for name, data in uploads.items():
+        files |= _unzipped(name, data, MOST_BYTES) if data.startswith(ZIP_START) else {name: data}
+    return read_files(files, frozenset(files) if len(files) > 1 else frozenset())
 
 
 def read_files(files: Mapping[str, bytes], optional: frozenset[str] = frozenset()) -> CalibrationFile:
@@ -96,13 +127,15 @@ def _read_limited(path: Path) -> bytes:
     return data
 
 
-def _unzipped(name: str, data: bytes) -> dict[str, bytes]:
+def _unzipped(name: str, data: bytes, most_bytes: int) -> dict[str, bytes]:
     """Return the files of a zip, without its folders; its sizes are what it says of itself and no more is unpacked."""
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as content:
             infos = [one for one in content.infolist() if Path(one.filename).suffix.lower() in SUFFIXES]
-            if len(infos) > MOST_FILES or sum(one.file_size for one in infos) > MOST_BYTES_OF_COLMAP:
-                raise FileRefusedError(name, "", f"at most {MOST_FILES} files of {MOST_BYTES_OF_COLMAP} bytes", "more")
+            if len(infos) > MOST_FILES or sum(one.file_size for one in infos) > most_bytes:
+                raise FileRefusedError(name, "", f"at most {MOST_FILES} files of {most_bytes} bytes", "more")
+            if not infos:
+                raise FileRefusedError(name, "", "a zip with calibration files", "none")
             return {one.filename: content.read(one) for one in infos}
     except (zipfile.BadZipFile, RuntimeError, NotImplementedError) as error:
         raise FileRefusedError(name, "", "a zip without a password", str(error)) from None

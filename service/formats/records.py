@@ -11,6 +11,7 @@ from pydantic import ValidationError
 
 from service.formats.lens import NumberedCamera
 from service.formats.nodes import FileRefusedError, Node
+from service.schemas.check import CheckedCamera
 from service.schemas.findings import describe_errors
 from service.schemas.geometry import DISTORTION_LENGTHS, Intrinsics, Pose, PosedCamera, UnposedCamera
 from service.schemas.names import LensModel, id_like
@@ -28,6 +29,12 @@ class CameraRecord:
     intrinsics: Intrinsics
     size: tuple[int, int] | None = None
     pose: Pose | None = None
+
+    @property
+    def to_check(self) -> CheckedCamera:
+        """The camera as a check takes it."""
+        size = None if self.size is None else [*self.size]
+        return CheckedCamera(id=self.id, image_size=size, intrinsics=self.intrinsics, pose=self.pose)
 
     def numbered(self, number: int) -> NumberedCamera:
         """Return the camera for the writers; refuse one without a size, which no format does without."""

@@ -57,14 +57,19 @@ def check_cameras(
     for camera in ids:
         if not counts.get(camera) and (needed is None or camera in needed):
             raise Problem("missing-camera", f"Send at least one frame of camera {camera}.", camera=camera, expected=ids)
-        if counts.get(camera, 0) > settings.max_frames_per_camera:
-            raise Problem(
-                "too-many-frames",
-                f"Send at most {settings.max_frames_per_camera} frames of camera {camera}.",
-                camera=camera,
-                expected=settings.max_frames_per_camera,
-                got=counts.get(camera, 0),
-            )
+        check_count(camera, counts.get(camera, 0), settings)
+
+
+def check_count(camera: str, count: int, settings: Settings) -> None:
+    """Raise the problem `too-many-frames` if a camera has too many."""
+    if count > settings.max_frames_per_camera:
+        raise Problem(
+            "too-many-frames",
+            f"Send at most {settings.max_frames_per_camera} frames of camera {camera}.",
+            camera=camera,
+            expected=settings.max_frames_per_camera,
+            got=count,
+        )
 
 
 class PixelBudget:
@@ -107,6 +112,11 @@ def check(
 def check_photo(name: str, data: bytes, settings: Settings) -> None:
     """Raise a problem unless a photo of a board is an entire JPEG or PNG of any size."""
     _size_of_whole_picture(data, settings, photo=name)
+
+
+def check_frame(camera: str, data: bytes, settings: Settings) -> list[int]:
+    """Return width and height of a frame of a camera of any size; raises a problem unless it is entire."""
+    return _size_of_whole_picture(data, settings, camera=camera)
 
 
 def check_length(length: int, settings: Settings, **part: Any) -> None:

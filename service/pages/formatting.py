@@ -27,6 +27,7 @@ KINDS: dict[JobKind, str] = {
     "locate": "First pose",
     "field": "Fit of the field",
     "find": "Search for cameras",
+    "check": "Check of a calibration",
 }
 STEPS = ((60.0, 1.0, "s"), (3600.0, 60.0, "min"), (86400.0, 3600.0, "h"), (float("inf"), 86400.0, "d"))
 # Replacements for details that only speak of requests.

@@ -15,6 +15,7 @@ SPELT_OUT = str.maketrans(
 )
 # Names of the parts of an upload.
 OPTIONS_PART = "options"
+CALIBRATION_PART = "calibration"
 PHOTOS_PART = "photos"
 SITE_PART = "site"
 
@@ -52,10 +53,10 @@ Scope = Literal["read", "calibrate", "admin"]
 # Kinds of events that a webhook can subscribe to.
 EventKind = Literal["poses.changed", "venue.*", "job.*", "alarm.*"]
 EVENT_KINDS: tuple[EventKind, ...] = get_args(EventKind)
-JobKind = Literal["calibration", "intrinsics", "locate", "field", "find"]
+JobKind = Literal["calibration", "intrinsics", "locate", "field", "find", "check"]
 # Kinds of jobs that wait in a queue of their own, by its name. First poses take a second, and somebody waits for them;
-# searches take minutes, and no calibration is to wait for them.
-OWN_QUEUES: Mapping[JobKind, str] = MappingProxyType({"locate": "light", "find": "search"})
+# searches, and checks that have to search, take minutes, and no calibration is to wait for them.
+OWN_QUEUES: Mapping[JobKind, str] = MappingProxyType({"locate": "light", "find": "search", "check": "search"})
 JobStatus = Literal["queued", "running", "succeeded", "failed", "cancelled"]
 # Verdicts on calibrations.
 Verdict = Literal["accepted", "partly", "rejected"]

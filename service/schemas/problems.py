@@ -79,6 +79,7 @@ PROBLEM_TYPES: dict[str, ProblemType] = {
     "broken-image": ProblemType(422, "The frame is damaged"),
     "truncated-image": ProblemType(422, "The frame ends too early"),
     "too-many-pixels": ProblemType(422, "The frame has too many pixels"),
+    "calibration-refused": ProblemType(422, "The calibration cannot be read"),
     "frame-size": ProblemType(422, "The frame does not have the size of the camera"),
     # Sources of frames.
     "source-refused": ProblemType(422, "The source of a camera is not allowed"),

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from service.schemas.base import OPEN_WORD, Id, OpenChoice, Schema
+from service.schemas.check import CheckResult
 from service.schemas.field import FieldOfPlay
 from service.schemas.geometry import Intrinsics, Light, Moved, Pose, Row
 from service.schemas.names import FieldNumber, Verdict
@@ -534,7 +535,7 @@ class FindResult(Schema):
 
 
 AnyResult = Annotated[
-    Result | IntrinsicsResult | LocateResult | FieldResult | FindResult,
+    Result | IntrinsicsResult | LocateResult | FieldResult | FindResult | CheckResult,
     Field(discriminator="kind"),
     OpenChoice("kind", "OtherResult", "Result of a kind of job that later versions add."),
 ]

@@ -5,12 +5,14 @@ from datetime import UTC, datetime
 import pytest
 import sqlalchemy as sa
 
+from service.formats.conversion import members_of, write_cameras
+from service.formats.records import CameraRecord
 from service.schemas.options import Board, ClickedPoint, IntrinsicsOptions, LocateOptions
 from service.schemas.results import CoverageResult, IntrinsicsResult, LocateResult, LocateSigma, PointResult
 from service.schemas.venue import VenueIn
 from service.store import tables
 from service.store.ids import new_id
-from testbed.running import venue
+from testbed.running import upload, venue
 
 CAMERA = VenueIn.model_validate(venue("kinds")).to_venue().cameras[0]
 POINT = PointResult(world="centre spot", residual_px=1.5, doubted=False, exchanged_with=None, looks_like=None)
@@ -75,3 +77,14 @@ def test_a_lens_and_a_first_pose_are_shown_with_what_they_are_worth(stub, kind):
     assert "Click more points on the far side." in shown
     assert "fx ± 2.3" in shown
     assert kind in stub.http.get(f"/ui/jobs?kind={kind}").raise_for_status().text
+
+
+def test_a_check_shows_the_grade_of_each_camera_and_why(stub):
+    cameras = [CameraRecord(camera, CAMERA.intrinsics, (64, 48), CAMERA.pose) for camera in ("left", "right")]
+    files = members_of(write_cameras(cameras, "pose2sim"), "left")
+    parts = [("calibration", file) for file in files.items()]
+    options = ("options", (None, '{"field": {"template": "tennis"}}'))
+    job = stub.end(stub.http.post("/check", files=[*parts, *upload(), options]).raise_for_status().json()["id"])
+    shown = stub.http.get(f"/ui/jobs/{job['id']}").raise_for_status().text
+    for words in ("Check of a calibration", "read as pose2sim", "Good", "Drifted", "turned by 0.6 degrees", "0.70 m"):
+        assert words in shown

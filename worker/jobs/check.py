@@ -1,15 +1,15 @@
-"""Check of a calibration of any origin by frames of its cameras."""
+"""A job of the kind `check`: from a calibration of any origin and frames of its cameras to a grade for each."""
 
+import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import cv2
 import numpy as np
 
-from service.schemas.check import CameraCheck, CheckCause
-from service.schemas.field import FieldOfPlay
+from service.schemas.check import GRADES, CameraCheck, CheckCause, CheckedCamera, CheckedFile, CheckResult
 from service.schemas.frame_sizes import is_resized, other_shape
-from service.schemas.geometry import Intrinsics, Pose
+from service.schemas.geometry import Pose
 from service.schemas.lens_map import LEAST_BLIND_SHARE, map_of, times_larger
 from worker.calibration.checking.check import GivenCamera, check_cameras
 from worker.calibration.checking.grade import GradedCamera, grade
@@ -19,41 +19,51 @@ from worker.compute_resources import ComputeResources
 from worker.jobs.decoding import decode_frames, size_of
 from worker.jobs.documents import Progress
 from worker.jobs.from_schemas import JobFailedError, lens_of, pitch_of
-from worker.jobs.to_schemas import engine_failures, lens_to_schema, load_segmenter, pose_to_schema, progress_to_schema
-
-
-@dataclass(frozen=True)
-class CheckedInput:
-    """A camera of a file: its lens, and its size (width, height) and pose where the file has them."""
-
-    id: str
-    intrinsics: Intrinsics
-    size: tuple[int, int] | None
-    pose: Pose | None
+from worker.jobs.to_schemas import (
+    Solution,
+    engine_failures,
+    lens_to_schema,
+    load_segmenter,
+    pose_to_schema,
+    progress_to_schema,
+    round_to_ms,
+)
 
 
 def solve(
-    field: FieldOfPlay,
-    cameras: Sequence[CheckedInput],
+    given: CheckedFile,
     files: Mapping[str, Sequence[bytes]],
-    seed: int,
     means: ComputeResources,
     report: Callable[[Progress], None],
-) -> list[CameraCheck]:
-    """Return the grade of each camera by the files of its frames. Raises `JobFailedError` for frames of no use."""
+) -> Solution[CheckResult]:
+    """Grade each camera by the files of its frames. Raises `JobFailedError` for frames of no use."""
+    begun = time.perf_counter()
     segmenter = load_segmenter(means)
     cv2.setNumThreads(means.threads)
-    frames = {camera.id: decode_frames(camera.id, None, files[camera.id]) for camera in cameras}
-    given = [_given(camera, size_of(frames[camera.id][0])) for camera in cameras]
-    pitch = pitch_of(field)
+    warnings: list[str] = []
+    frames = {camera.id: decode_frames(camera.id, None, files[camera.id], warnings.append) for camera in given.cameras}
+    cameras = [_given(camera, size_of(frames[camera.id][0])) for camera in given.cameras]
+    pitch = pitch_of(given.field)
     with engine_failures():
-        checked = check_cameras(pitch, given, frames, segmenter, seed, lambda step: report(progress_to_schema(step)))
-    return [_to_schema(grade(pitch, one, _folds(one.meant.intrinsics))) for one in checked]
+        checked = check_cameras(
+            pitch, cameras, frames, segmenter, given.seed or 0, lambda step: report(progress_to_schema(step))
+        )
+    graded = [_to_schema(grade(pitch, one, _folds(one.meant.intrinsics))) for one in checked]
+    result = CheckResult(
+        grade=next(worst for worst in GRADES if any(one.grade == worst for one in graded)),
+        format=given.format,
+        field=given.field,
+        cameras=graded,
+        warnings=warnings,
+        timings_s=round_to_ms({"check": time.perf_counter() - begun}),
+        software=means.software,
+    )
+    return Solution(result, {})
 
 
-def _given(camera: CheckedInput, size: tuple[int, int]) -> GivenCamera:
+def _given(camera: CheckedCamera, size: tuple[int, int]) -> GivenCamera:
     """Return a camera with its lens for frames of a size."""
-    written_for = camera.size or size
+    written_for = size if camera.image_size is None else (camera.image_size[0], camera.image_size[1])
     if not is_resized(size, written_for):
         raise JobFailedError("frame-size", other_shape(camera.id, size, written_for), camera.id)
     lens = lens_of(camera.intrinsics, [*written_for])

@@ -2,13 +2,14 @@
 
 simplejpeg decodes with libjpeg-turbo, as OpenCV does and to the same pixels, and stops at the first warning. A damage
 that leaves as many blocks as there were leads to none: hardly one in a hundred of a frame of 4K, one in ten where
-pieces of a frame of 1080p are exchanged. The pixels tell more than half of these. Blocks are coded as differences to
-the block before: what is lost in one makes all that follow too bright, too dark or too colourful, and where that
-begins, a step runs along the edges of blocks for just one row's length.
+pieces of a frame of 1080p are exchanged. Zeros in place of data are seen in the data. The pixels tell more than half of
+the others. Blocks are coded as differences to the block before: what is lost in one makes all that follow too bright,
+too dark or too colourful, and where that begins, a step runs along the edges of blocks for just one row's length.
 """
 
 import re
-from collections.abc import Callable
+import struct
+from collections.abc import Callable, Iterator
 
 import cv2
 import numpy as np
@@ -23,6 +24,13 @@ PADDING = b"\0\r\n"
 ODDITY = re.compile(r"unknown JFIF|Unknown Adobe|ICC|Invalid SOS parameters|determine subsampling")
 """Messages of libjpeg (jerror.h) that are not about pixels, and the one for files that OpenCV reads and simplejpeg does
 not. After any other message OpenCV shows only the part of the picture before the damage."""
+ZEROS = bytes(256)
+"""More than the blocks that are coded at a time have in any picture (MCU: at most 10 blocks of 64 coefficients)."""
+START_OF_SCAN, HUFFMAN_TABLES = 0xDA, 0xC4
+SEQUENTIAL = (0xC0, 0xC1)
+"""Markers of frames that are coded in one go; in refinements of progressive ones many zeros mean "as before"."""
+END_OF_BLOCK, FIRST_OF_STANDARD = 0, 1
+"""Meanings of codes; cameras that send MJPEG leave out the tables of the standard (T.81, K.3.3)."""
 BLOCKS = {
     "Gray": (8, 8),
     "444": (8, 8),
@@ -49,11 +57,44 @@ def decode_jpeg(file: bytes, *, grey: bool) -> Picture | None:
 
     Raises `DamagedPictureError` where its picture is damaged, and does not go by the EXIF orientation.
     """
+    if _is_zeroed(file):
+        raise DamagedPictureError("it is damaged (zeros in place of its data)")
     picture = _decode_strictly(file, grey)
     row = None if picture is None else _shifted_from(picture, file)
     if row is not None:
         raise DamagedPictureError(f"it is damaged from row {row} on")
     return picture
+
+
+def _is_zeroed(file: bytes) -> bool:
+    """True if a piece of the data of a sequential JPEG is zeros that cannot be a picture.
+
+    Zeros are the first code of a Huffman table, again and again. Where that ends a block they are flat blocks, else
+    such of one coefficient in all frequencies, which no scene has.
+    """
+    first_codes: dict[int, int] = {}
+    sequential, position = False, 2
+    while position + 4 <= len(file) and file[position] == 0xFF:
+        marker, length = struct.unpack_from(">xBH", file, position)
+        if marker == 0xFF:
+            position += 1
+            continue
+        part, position = file[position + 4 : position + 2 + length], position + 2 + length
+        sequential |= marker in SEQUENTIAL
+        if marker == HUFFMAN_TABLES:
+            first_codes |= dict(_first_codes(part))
+        if marker == START_OF_SCAN and len(part) > 2:
+            first = first_codes.get(0x10 | part[2] & 0x0F, FIRST_OF_STANDARD)
+            scan = file[position : file.find(END, position)].rstrip(PADDING)
+            return sequential and first != END_OF_BLOCK and ZEROS in scan
+    return False
+
+
+def _first_codes(part: bytes) -> Iterator[tuple[int, int]]:
+    """Yield class and number of each Huffman table of a segment, and what its first code means (T.81, B.2.4.2)."""
+    while len(part) > 17:
+        yield part[0], part[17]
+        part = part[17 + sum(part[1:17]) :]
 
 
 def _decode_strictly(file: bytes, grey: bool) -> Picture | None:

@@ -24,6 +24,7 @@ import cv2
 import numpy as np
 
 from service import child_process
+from service.schemas.names import OWN_QUEUES
 from worker.compute_resources import ComputeResources
 from worker.jobs.documents import Document, Progress, parse, parse_task
 from worker.jobs.from_schemas import JobFailedError
@@ -48,7 +49,7 @@ def main() -> None:
     parent = Parent()
     logging.basicConfig(handlers=[parent], format="%(message)s")
     request, files = read_request(sys.stdin.buffer)
-    if request["task"]["kind"] == "find":
+    if OWN_QUEUES.get(request["task"]["kind"]) == "search":
         os.nice(BEHIND_CALIBRATIONS)
     means = ComputeResources(**request["means"] | {"model": Path(request["means"]["model"])})
     try:
@@ -113,7 +114,8 @@ def _compute_by_models(
     means: ComputeResources,
     report: Callable[[Progress], None],
 ) -> Solution[Any]:
-    """Compute a job of the kinds that a venue asks for once in its life."""
+    """Compute a job of the kinds that are rarely asked for."""
+    from service.schemas.check import CheckedFile
     from service.schemas.options import FieldOptions, FindOptions, IntrinsicsOptions, LocateOptions
     from service.store.jobs.task import Task
 
@@ -138,6 +140,10 @@ def _compute_by_models(
             from worker.jobs import find
 
             return find.solve(_site_of(task, options, files), files, options.seed or 0, means, report)
+        case CheckedFile() as given:
+            from worker.jobs import check
+
+            return check.solve(given, files, means, report)
         case _:
             raise AssertionError(task.kind)
 

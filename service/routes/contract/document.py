@@ -8,6 +8,7 @@ from fastapi import FastAPI
 
 from service.routes.contract.documented import KEY_SCHEME, SCHEMAS, SENT
 from service.routes.contract.problem_docs import document_problems
+from service.schemas.check import CheckOptions
 from service.schemas.events.venue_event import Event
 from service.schemas.find import SoughtSite
 from service.schemas.health import AlarmEvent
@@ -62,7 +63,7 @@ def document_webhooks(app: FastAPI) -> None:
 
     @app.webhooks.post(PARTS_OF_FORMS, response_model=ProblemDetails)
     def parts_of_forms(
-        sent: Options | IntrinsicsOptions | LocateOptions | FieldOptions | FindOptions | SoughtSite,
+        sent: Options | IntrinsicsOptions | LocateOptions | FieldOptions | FindOptions | CheckOptions | SoughtSite,
     ) -> None:
         """Name the schemas of forms and problems."""
 

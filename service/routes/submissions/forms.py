@@ -1,6 +1,7 @@
 """Upload forms: checks before they are read, their options and their frames."""
 
 import json
+from collections import Counter
 from collections.abc import AsyncIterator, Collection
 from contextlib import asynccontextmanager
 from typing import TypeVar
@@ -109,13 +110,19 @@ def frames_by_camera(
 
     `needed`: the cameras of which there must be some, None: all. `documents`: the parts that are no frames.
     """
-    parts = [(name, part) for name, part in form.multi_items() if name not in documents]
-    names = [name for name, _ in parts]
-    counts = {name: names.count(name) for name in names}
+    counts = Counter(name for name, _ in form.multi_items() if name not in documents)
     image_checks.check_cameras(place, counts, context.settings, needed)
-    files: dict[str, list[UploadFile]] = {camera.id: [] for camera in place.cameras if camera.id in counts}
-    for name, part in parts:
+    files = files_by_camera(form, documents)
+    return {camera.id: files[camera.id] for camera in place.cameras if camera.id in files}
+
+
+def files_by_camera(form: FormData, documents: Collection[str]) -> dict[str, list[UploadFile]]:
+    """Return the parts of a form but those of `documents`, by their names; raises a problem for what is no file."""
+    files: dict[str, list[UploadFile]] = {}
+    for name, part in form.multi_items():
+        if name in documents:
+            continue
         if not isinstance(part, UploadFile):
             raise Problem("not-a-file", f"Send camera {name} as a file, with curl: -F {name}=@frame.jpg", camera=name)
-        files[name].append(part)
+        files.setdefault(name, []).append(part)
     return files

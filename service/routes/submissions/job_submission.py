@@ -54,7 +54,7 @@ def submit_files(
 ) -> tuple[Job, bool]:
     """Check and store files and submit them; return the job, which may be an older one, and True if it is new.
 
-    `about`: the venue, or the site of one that is not stored yet; None for photos of a lens.
+    `about`: the venue, or the site of one that is not stored yet; None for photos of a lens and for a check.
     """
     submission = _submission(context, about, options, files, sender)
 
@@ -87,7 +87,7 @@ def _submission(
     # The kind too: the same frames with the same key may be those of another job.
     asked = f"{kind} {options.model_dump_json()}" + ("" if site is None else f" {site.model_dump_json()}")
     content = hashlib.sha256(asked.encode())
-    part = "photo" if about is None else "camera"
+    part = "photo" if kind == "intrinsics" else "camera"
     for name, upload in ((name, upload) for name, several in files.items() for upload in several):
         # All of them before the first is read: a size costs nothing.
         image_checks.check_length(upload.size or 0, context.settings, **{part: name})
@@ -99,8 +99,10 @@ def _submission(
         content.update(f"\n{name}".encode())
         for upload in several:
             with context.uploads.content(upload) as data:
-                if about is None:
+                if kind == "intrinsics":
                     image_checks.check_photo(name, data, context.settings)
+                elif about is None:
+                    budget.spend(image_checks.check_frame(name, data, context.settings), camera=name)
                 else:
                     resize = kind != "locate"
                     image_checks.check(cameras[name], data, context.settings, budget, of_any_size=resize)
@@ -119,7 +121,7 @@ def _submission(
         venue=None if isinstance(about, SoughtSite) else about,
         site=site,
         options=seeded(options),
-        frames=frame_paths(job_id, hashes) if about else photos,
+        frames=photos if kind == "intrinsics" else frame_paths(job_id, hashes),
         origin=sender.origin,
         content_hash=content.hexdigest(),
         idempotency_key=sender.idempotency_key,

@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError, ValidationInfo, fie
 
 from service.schemas.actor import Actor
 from service.schemas.base import TOLERANTLY
+from service.schemas.check import CheckedFile
 from service.schemas.find import SoughtSite
 from service.schemas.names import JobKind
 from service.schemas.options import FieldOptions, FindOptions, Handling, IntrinsicsOptions, LocateOptions, Options
@@ -18,13 +19,14 @@ from service.schemas.venue import Venue
 
 # The name of the actor where no keys are required.
 ANYONE = "anyone"
-AnyOptions = Options | IntrinsicsOptions | LocateOptions | FieldOptions | FindOptions
+AnyOptions = Options | IntrinsicsOptions | LocateOptions | FieldOptions | FindOptions | CheckedFile
 OPTIONS: dict[JobKind, type[AnyOptions]] = {
     "calibration": Options,
     "intrinsics": IntrinsicsOptions,
     "locate": LocateOptions,
     "field": FieldOptions,
     "find": FindOptions,
+    "check": CheckedFile,
 }
 
 
@@ -40,7 +42,7 @@ def kind_of(options: AnyOptions) -> JobKind:
 
 def seeded(options: AnyOptions) -> AnyOptions:
     """The options with a seed where one can be chosen and was not, so that a job can be computed again alike."""
-    if not isinstance(options, Options | FieldOptions | FindOptions) or options.seed is not None:
+    if not isinstance(options, Options | FieldOptions | FindOptions | CheckedFile) or options.seed is not None:
         return options
     return options.model_copy(update={"seed": secrets.randbelow(2**31)})
 
@@ -80,8 +82,8 @@ class Origin:
 class JobInput(BaseModel):
     """The input of a job: venue snapshot, options, frames, origin.
 
-    `options` are those of its kind; photos of a lens have no venue, and `site` is one that is not stored yet, whose
-    cameras are to be found. `frames`: the paths in the blob store by camera, of photos by their names.
+    `options` are those of its kind; photos of a lens and checks have no venue, and `site` is one that is not stored
+    yet, whose cameras are to be found. `frames`: the paths in the blob store by camera, of photos by their names.
     """
 
     model_config = ConfigDict(frozen=True)
@@ -96,7 +98,8 @@ class JobInput(BaseModel):
 
     @property
     def venue_id(self) -> str | None:
-        """The venue that the job is about, which need not be stored yet; None: photos of a lens are about none."""
+        """The venue that the job is about, which need not be stored yet; None: photos of a lens and checks are about
+        none."""
         about = self.venue or self.site
         return None if about is None else about.id
 

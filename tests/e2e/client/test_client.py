@@ -15,6 +15,9 @@ import pytest
 from service import client as client_module
 from service import client_errors as refused_module
 from service.client import AsyncClient, Client, Refused
+from service.formats.conversion import members_of, write_cameras
+from service.formats.records import CameraRecord
+from service.schemas.check import CheckResult
 from service.schemas.events.venue_event import VenueChange, VenueEvent
 from service.schemas.field import FieldOfPlay
 from service.schemas.find import SoughtCameraIn, SoughtSite
@@ -65,6 +68,18 @@ def test_a_venue_begins_with_frames_and_a_sport(service, frames, name):
         assert [camera.pose.position[1] for camera in stored.cameras] == [-40, -60]
         again = client.follow(client.find(name, {"left": frames["left"]}, {"find_lens": True}), print)
         assert [camera.id for camera in again.result.cameras] == ["left"]
+
+
+def test_the_calibration_of_a_tool_is_checked(service, frames, tmp_path):
+    camera = VenueIn.model_validate(venue("any")).to_venue().cameras[0]
+    record = CameraRecord("left", camera.intrinsics, (64, 48), camera.pose)
+    ((file, content),) = members_of(write_cameras([record], "pose2sim"), "left").items()
+    calibration = tmp_path / file
+    calibration.write_bytes(content)
+    with Client(service.url) as client:
+        job = client.follow(client.check([calibration], {"left": frames["left"]}, {"field": {"template": "tennis"}}))
+    assert isinstance(job.result, CheckResult)
+    assert (job.result.format, job.result.grade) == ("pose2sim", "good")
 
 
 def test_the_same_without_blocking(service, frames, name):

@@ -1,6 +1,7 @@
 """Lenses and first poses by HTTP and by `esc`, computed by the real program."""
 
 import json
+import math
 import subprocess
 import sys
 from dataclasses import replace
@@ -9,8 +10,12 @@ import cv2
 import numpy as np
 import pytest
 
+from service.formats.conversion import members_of, write_cameras
+from service.schemas.geometry import Pose
+from testbed import rendered_pair
 from testbed.running import png
 from tests.e2e.commands import esc_here
+from tests.service.cli.test_check import records
 from tests.worker.calibration.onboarding.test_first_pose import CAMERA, LENS, SIZE, clicks
 from tests.worker.calibration.onboarding.test_lens_calibration import BOARD, PINHOLE, corners_seen, photograph, places
 
@@ -246,3 +251,20 @@ def test_a_file_that_is_no_lens_is_answered_with_one(tmp_path):
     assert posed.returncode == 2
     assert "image_size is missing" in posed.stderr
     assert 'Expected is {"image_size": [3840, 2160], "intrinsics": {"matrix": ' in posed.stderr
+
+
+@pytest.mark.long
+def test_a_calibration_of_another_tool_is_graded_by_frames(service):
+    left, right = records()
+    tilt, *rest = right.pose.rotation
+    turned = Pose.from_position([tilt + math.radians(0.6), *rest], right.pose.position)
+    given = [left, replace(right, pose=turned)]
+    files = members_of(write_cameras(given, "pose2sim"), "pair")
+    field = {"template": "football", "line_width_m": 0.12, "ridge": rendered_pair.PITCH.ridge.tolist()}
+    sent = [("calibration", file) for file in files.items()]
+    sent += [(camera, (f"{camera}.jpg", data)) for camera, data in rendered_pair.frames().items()]
+    answer = service.http.post("/check", files=[*sent, ("options", (None, json.dumps({"field": field, "seed": 1})))])
+    job = service.end(answer.raise_for_status().json()["id"])
+    assert job["status"] == "succeeded", job["error"]
+    assert {one["id"]: one["grade"] for one in job["result"]["cameras"]} == {"left": "good", "right": "drifted"}
+    assert [cause["cause"] for cause in job["result"]["cameras"][1]["causes"]] == ["turned"]

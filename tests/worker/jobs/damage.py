@@ -82,7 +82,7 @@ def whole_files(scene, qualities=(10, 60, 90, 100)):
                 yield f"{variety} {sampling} {quality}", _jpeg(scene, chosen)
         yield f"grey {quality}", _jpeg(scene[..., 1], [cv2.IMWRITE_JPEG_QUALITY, quality])
         plain = _jpeg(scene, [cv2.IMWRITE_JPEG_QUALITY, quality])
-        yield f"no tables {quality}", _without_tables(plain)
+        yield f"no tables {quality}", without_tables(plain)
         yield f"bytes behind it {quality}", plain + bytes(3000)
         yield f"fill bytes before its end {quality}", plain[:-2] + b"\xff" * 20 + plain[-2:]
         yield f"line break before its end {quality}", plain[:-2] + b"\r\n" + plain[-2:]
@@ -95,7 +95,7 @@ def _jpeg(picture, options):
     return cv2.imencode(".jpg", picture, options)[1].tobytes()
 
 
-def _without_tables(jpeg):
+def without_tables(jpeg):
     """As MJPEG is sent: Huffman tables are those of the standard, which nobody repeats."""
     kept = [(position, length) for position, marker, length in segments(jpeg) if marker != 0xC4]
     *headers, (scan, _) = kept

@@ -1,0 +1,91 @@
+"""Submission of checks: the calibration of any tool and frames of its cameras become a job that grades it."""
+
+from fastapi import APIRouter, Request, Response
+from starlette.concurrency import run_in_threadpool
+from starlette.datastructures import FormData, UploadFile
+
+from service.api.context import Context, InContext
+from service.formats.nodes import FileRefusedError
+from service.formats.parsing import MOST_BYTES
+from service.formats.reading import CalibrationFile, read_uploads
+from service.intake import image_checks
+from service.routes.contract.documented import FILE, form_body, needs_scope, submission_responses
+from service.routes.contract.guarded import Guarded
+from service.routes.contract.problem_docs import OF_UPLOADS, problem_responses
+from service.routes.submissions import forms, job_submission
+from service.routes.submissions.intrinsics import printable_name
+from service.routes.submissions.job_submission import FromSender, Sender
+from service.schemas.check import CheckedFile, CheckOptions
+from service.schemas.job import Job
+from service.schemas.names import CALIBRATION_PART, OPTIONS_PART
+from service.schemas.problems import Problem
+
+router = APIRouter(tags=["jobs"], route_class=Guarded)
+
+# As many as the cameras of a venue, and some for tools that write several files for each.
+MOST_CAMERAS, MOST_CALIBRATION_FILES = 32, 100
+UPLOAD = form_body(
+    CheckOptions,
+    "The calibration, each of its files a part `calibration` with its file name, and a JPEG or PNG of each camera to "
+    "check, the part named by the camera's id in the calibration; repeat a part to send several frames of a camera.",
+    needed=[OPTIONS_PART, CALIBRATION_PART],
+    parts={CALIBRATION_PART: {"type": "array", "items": FILE}},
+)
+
+
+@router.post(
+    "/check",
+    status_code=202,
+    response_model=Job,
+    responses=submission_responses()
+    | problem_responses(*OF_UPLOADS, "calibration-refused", "missing-camera", "unknown-camera", "too-many-frames"),
+    openapi_extra=UPLOAD | needs_scope("calibrate"),
+)
+async def submit_check(request: Request, context: InContext, sender: FromSender) -> Response:
+    """Check the calibration of any tool by frames of its cameras: a grade for each, how far it is off, and why.
+
+    Read are all formats of `esc convert`, files of a tool that writes one for each camera as well. No venue is needed,
+    and none is changed.
+    """
+    await run_in_threadpool(forms.require_disk_space, context)
+    await run_in_threadpool(job_submission.require_queue_room, context, None, "check", sender)
+    most = MOST_CALIBRATION_FILES + MOST_CAMERAS * context.settings.max_frames_per_camera
+    async with forms.parsed_upload(request, context, most) as form:
+        return await run_in_threadpool(_submit, context, form, sender)
+
+
+def _submit(context: Context, form: FormData, sender: Sender) -> Response:
+    options = forms.parse_options(form, CheckOptions, context.settings)
+    found = _read_calibration(context, form)
+    frames = forms.files_by_camera(form, (OPTIONS_PART, CALIBRATION_PART))
+    if not frames:
+        raise Problem(
+            "missing-camera",
+            "Send a frame of each camera that is to be checked.",
+            expected=[c.id for c in found.cameras],
+        )
+    cameras = [one.to_check for one in found.with_frames([*frames])]
+    for id, several in frames.items():
+        image_checks.check_count(id, len(several), context.settings)
+    given = CheckedFile(**dict(options), format=found.format, cameras=cameras)
+    return job_submission.submission_response(*job_submission.submit_files(context, None, given, frames, sender))
+
+
+def _read_calibration(context: Context, form: FormData) -> CalibrationFile:
+    """Return what the parts `calibration` of a form have, by their file names."""
+    files: dict[str, bytes] = {}
+    size = 0
+    for number, part in enumerate(form.getlist(CALIBRATION_PART)):
+        if not isinstance(part, UploadFile):
+            raise Problem("not-a-file", f"Send the calibration as a file, with curl: -F {CALIBRATION_PART}=@Calib.toml")
+        size += part.size or 0
+        if size > MOST_BYTES:
+            raise Problem("calibration-refused", f"Send a calibration of at most {MOST_BYTES} bytes.", got=size)
+        with context.uploads.content(part) as data:
+            files[printable_name(part.filename, number)] = data
+    if not files:
+        raise Problem("calibration-refused", f"Send the files of a calibration as file parts named {CALIBRATION_PART}.")
+    try:
+        return read_uploads(files)
+    except FileRefusedError as refusal:
+        raise Problem("calibration-refused", f"{refusal}.") from None
