@@ -85,7 +85,6 @@ def check(
 
 
 def _parse_field(sport: str | None, size: str | None, site: Path) -> FieldOfPlay:
-    """Return the field of a sport, or of a file with a field."""
     if sport is None:
         described = _field_of(site)
         if described is None or size is not None:

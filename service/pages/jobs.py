@@ -59,7 +59,6 @@ def job(job_id: JobIdPath, request: Request, context: InContext) -> Response:
 
 
 def _job_content(job_id: str, context: Context) -> dict[str, Any]:
-    """Return the content of the page of a job."""
     found = context.jobs.get(job_id)
     if found is None:
         kept = f"{context.settings.keep_jobs_days:g} days"

@@ -169,7 +169,6 @@ def _suggestion(place: Location, model: Any) -> str:
 
 
 def _models(annotation: Any) -> list[type[BaseModel]]:
-    """Return the models that an annotation mentions."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         root = annotation.model_fields.get("root")
         return [annotation] if root is None else _models(root.annotation)

@@ -257,7 +257,6 @@ class VenueRepository(Repository):
 
 
 def _health_of(connection: sa.Connection, venue_id: str) -> VenueHealth | None:
-    """Return the health of a venue, None if there is no such venue."""
     newest = newest_revision(connection, venue_id)
     if newest is None:
         return None

@@ -111,7 +111,6 @@ def _require_memory(file: bytes) -> None:
 
 
 def _without_animation(png: bytes) -> Iterator[bytes]:
-    """Yield the parts of a PNG that are not of its animation."""
     yield PNG_START
     position = len(PNG_START)
     while position + 12 <= len(png):

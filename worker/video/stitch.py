@@ -340,7 +340,6 @@ def _check_cameras(scene: StitchScene, addresses: Mapping[str, str], plan: Plan)
 
 
 def _sound_clip(clips: Mapping[str, Clip], wanted: str | None) -> Clip | None:
-    """Return the clip whose sound is kept."""
     if wanted == SILENT:
         return None
     if wanted is None:

@@ -80,7 +80,6 @@ def _submit(context: Context, venue_id: str, form: FormData, sender: Sender) -> 
 
 
 def _sought_of_venue(stored: Venue, form: FormData, options: FindOptions) -> Collection[str]:
-    """Return the cameras of a stored venue that are to be found."""
     # A camera may be called so, and its frame then is.
     if SITE_PART in form and SITE_PART not in stored.poses:
         raise venue_is_stored(stored.id)

@@ -125,7 +125,6 @@ def _farther_away(
 
 
 def _together(lines: LinePoints, one: Measurements, other: Measurements) -> Measurements:
-    """Return the measurements of both."""
     both = {name: np.concatenate([getattr(one, name), getattr(other, name)]) for name in MEASURED}
     return Measurements(points=lines[both["index"]], misfit_px=one.misfit_px, **both)
 

@@ -199,7 +199,6 @@ class _Problem:
         return (there.with_lens(self._lens(then)) if self.index else there), then
 
     def _lens(self, change: Array) -> Lens:
-        """Return the lens with its free parameters changed."""
         by = np.zeros(len(FREE_PARAMETERS))
         by[self.index] = change
         matrix = self.lens.matrix.copy()
