@@ -28,7 +28,7 @@ from service.routes.contract.tagged import TAGGED, IfNoneMatch, json_response, t
 from service.schemas import etags
 from service.schemas.base import Day, Name
 from service.schemas.events import callback_urls
-from service.schemas.geometry import PoseIn
+from service.schemas.geometry import PictureMotion, PoseIn
 from service.schemas.health import VenueHealth
 from service.schemas.history import AdoptField, AdoptFound, History, Restore
 from service.schemas.merge_patch import MEDIA_TYPE, apply_merge_patch
@@ -255,6 +255,34 @@ def get_camera_trend(
     camera_of(venue, camera)
     first = None if since is None else datetime.combine(since, time.min, UTC)
     body = context.trends.of(venue, camera, first).model_dump_json().encode()
+    return tagged_response(body, if_none_match, json_response(body))
+
+
+@router.get(
+    "/{venue_id}/cameras/{camera}/picture-motion",
+    openapi_extra=needs_scope("read"),
+    response_model=PictureMotion,
+    responses=TAGGED | problem_responses("revision-not-found", "revision-unfit"),
+)
+def get_picture_motion(
+    venue_id: VenueIdPath,
+    camera: CameraIdPath,
+    context: InContext,
+    since: Annotated[int, Query(ge=1, description="Revision of the poses at which masks or zones were drawn.")],
+    if_none_match: IfNoneMatch = None,
+) -> Response:
+    """Tell how the picture of a camera has moved since a revision, so that masks and zones in it can follow.
+
+    `/history` lists revisions, and the event `poses.changed` says when to ask again.
+    """
+    # OpenCV takes its time to load.
+    from service.store.movement import picture_motion
+
+    before, venue, revision = context.venues.states_since(venue_id, since)
+    then, now = camera_of(before, camera), camera_of(venue, camera)
+    homographies = picture_motion(venue.field, then, now)
+    motion = PictureMotion(since=since, revision=revision, image_size=now.image_size, **homographies)
+    body = motion.model_dump_json().encode()
     return tagged_response(body, if_none_match, json_response(body))
 
 

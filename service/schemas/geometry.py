@@ -241,6 +241,27 @@ class Moved(Schema):
     pixels: float | None = Field(description="Mean shift of the visible pitch in the picture; null: none is in view.")
 
 
+Homography = Annotated[list[Row], Field(min_length=3, max_length=3)]
+
+
+class PictureMotion(Schema):
+    """Motion of a camera's picture from an earlier revision of its pose to the one in use.
+
+    Homographies map pixels (x, y, 1) of then to pixels of now, so that masks and zones can follow the camera: those on
+    the pitch by `ground`, those on what is far away by `far`.
+    """
+
+    since: int = Field(description="The earlier revision.")
+    revision: int = Field(description="The revision in use.")
+    image_size: list[int] = Field(description="Width and height of the picture, pixels.")
+    ground: Homography | None = Field(description="Of what lies on the ground; null where no ground is in view.")
+    ground_residual_px: float | None = Field(
+        description="Largest distance between it and the cameras, pixels: lenses bend what a homography keeps straight."
+    )
+    far: Homography = Field(description="Of what is so far away that only the camera's rotation and zoom move it.")
+    far_residual_px: float = Field(description="The same for `far`.")
+
+
 class Movement(Schema):
     """Movement of a camera since earlier revisions; null: there was none, or it is unknown."""
 

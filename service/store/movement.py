@@ -8,6 +8,7 @@ movement is wanted.
 import math
 from functools import lru_cache
 from itertools import pairwise
+from typing import Any
 
 import cv2
 import numpy as np
@@ -24,6 +25,9 @@ POINTS = 150
 # Samples (tangent of the angle from the axis) for finding where a lens model turns back: the whole picture of a long
 # lens lies within some thousandths.
 NEAREST, WIDEST, STEPS = 1e-4, 6.0, 600
+# Ground beside the field that counts to a picture's motion, points along each side of a grid, and how many of them fix
+# a homography (four) with some to spare.
+BESIDE_M, GRID, LEAST_SEEN = 10.0, 60, 8
 
 
 def moved(field: FieldOfPlay, before: PosedCamera, after: PosedCamera) -> Moved:
@@ -46,6 +50,38 @@ def turned_deg(before: PosedCamera, after: PosedCamera) -> float:
 def _rotation(camera: PosedCamera) -> Array:
     """Return the rotation (3, 3) from world to camera."""
     return np.asarray(cv2.Rodrigues(np.array(camera.pose.rotation, dtype=float))[0], dtype=float)
+
+
+def picture_motion(field: FieldOfPlay, before: PosedCamera, after: PosedCamera) -> dict[str, Any]:
+    """Return the homographies of `PictureMotion` from the picture of one state to that of another, and residuals."""
+    half = np.array([field.length_m, field.width_m]) / 2 + BESIDE_M
+    steps = [np.linspace(-side, side, GRID) for side in half]
+    ground = np.stack(np.meshgrid(*steps), axis=-1).reshape(-1, 2)
+    on_ground = _homography(before, pixels(before, ground), pixels(after, ground))
+    (fx, _, _), (_, fy, _), _ = before.intrinsics.matrix
+    width, height = before.image_size
+    sides = np.meshgrid(np.linspace(-1, 1, GRID) * width / fx, np.linspace(-1, 1, GRID) * height / fy)
+    rays = np.stack([*sides, np.ones_like(sides[0])], axis=-1).reshape(-1, 3)
+    turn = _rotation(after) @ _rotation(before).T
+    far = _homography(before, _seen(before, rays), _seen(after, rays @ turn.T))
+    return {
+        "ground": None if on_ground is None else on_ground[0],
+        "ground_residual_px": None if on_ground is None else on_ground[1],
+        "far": np.eye(3).tolist() if far is None else far[0],
+        "far_residual_px": 0.0 if far is None else far[1],
+    }
+
+
+def _homography(before: PosedCamera, was: Array, now: Array) -> tuple[list[list[float]], float] | None:
+    """Return the homography between pixels (N, 2), and the largest distance from it; None if too few are in view."""
+    seen = _inside(before, was) & np.isfinite(now).all(axis=1)
+    if seen.sum() < LEAST_SEEN:
+        return None
+    found, _ = cv2.findHomography(was[seen], now[seen])
+    if found is None:
+        return None
+    residuals = cv2.perspectiveTransform(was[seen][None], found)[0] - now[seen]
+    return found.tolist(), float(np.linalg.norm(residuals, axis=1).max())
 
 
 def visible_m(field: FieldOfPlay, camera: PosedCamera) -> float:
@@ -102,12 +138,16 @@ def _shares(length: float, spacing: float) -> Array:
 def pixels(camera: PosedCamera, points: Array) -> Array:
     """Project points of the ground (N, 2) into the picture (N, 2); NaN behind the camera and beyond the lens model."""
     on_ground = np.column_stack([points, np.zeros(len(points))])
-    seen_from_camera = on_ground @ _rotation(camera).T + camera.pose.translation
+    return _seen(camera, on_ground @ _rotation(camera).T + camera.pose.translation)
+
+
+def _seen(camera: PosedCamera, seen_from_camera: Array) -> Array:
+    """Project points (N, 3) in the camera's frame (N, 2); NaN behind the camera and beyond the lens model."""
     across, depth = np.hypot(*seen_from_camera.T[:2]), seen_from_camera[:, 2]
     lens = camera.intrinsics
     distortion = np.array(lens.distortion or [0.0] * 4)
     held = (depth > 0) & (across <= _turning_back(lens.model, distortion) * depth)
-    places = np.full(points.shape, np.nan)
+    places = np.full((len(seen_from_camera), 2), np.nan)
     if held.any():
         matrix = np.array(lens.matrix)
         places[held] = _distorted(lens.model, distortion, seen_from_camera[held]) @ matrix[:2, :2].T + matrix[:2, 2]

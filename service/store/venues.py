@@ -221,6 +221,19 @@ class VenueRepository(Repository):
             stored = find_stored(connection, venue_id)
             return None if stored is None else (stored.venue, read_credentials(connection, venue_id))
 
+    def states_since(self, venue_id: str, number: int) -> tuple[Venue, Venue, int]:
+        """Return a venue as it was at a revision and as it is, and the number of its newest revision.
+
+        Raises the problems `venue-not-found`, `revision-not-found` and `revision-unfit`.
+        """
+        with reading(self._engine) as connection:
+            stored = find_stored(connection, venue_id)
+            if stored is None:
+                raise no_such_venue(venue_id)
+            then, revision = state_at(connection, stored.venue, number)
+            newest = newest_revision(connection, venue_id) or revision
+            return then, stored.venue, newest.revision
+
     def readable(self, venue_id: str) -> Venue | None:
         """Return a venue, None if there is none or it cannot be read."""
         with reading(self._engine) as connection:

@@ -74,3 +74,34 @@ def test_a_point_that_a_lens_formula_folds_back_into_the_picture_is_not_in_view(
     beside, before = movement.pixels(shot, np.array([[40.0, -49.0], [-20.0, 0.0]]))
     assert np.isnan(beside).all()
     assert np.isfinite(before).all()
+
+
+@pytest.mark.parametrize("lens", ["none", "barrel"])
+def test_masks_follow_a_turned_camera_on_the_ground_and_far_away(lens):
+    before, after = camera(lens), camera(lens, turned=(0.004, -0.006, 0.002), by=(0.05, 0.1, -0.02))
+    motion = movement.picture_motion(FIELD, before, after)
+    ground = np.array([[-30.0, 0.0], [-10.0, -20.0], [0.0, 30.0]])
+    was, now = movement.pixels(before, ground), movement.pixels(after, ground)
+    np.testing.assert_allclose(mapped(motion["ground"], was), now, atol=motion["ground_residual_px"])
+    assert motion["ground_residual_px"] < {"none": 1e-3, "barrel": 4.0}[lens]
+    assert np.linalg.norm(now - was, axis=1).min() > 5
+    # Towards places 10 km away nothing but the turn counts.
+    far = np.array([[2000.0, 10_000.0], [-3000.0, 10_000.0]])
+    was, now = movement.pixels(before, far), movement.pixels(after, far)
+    np.testing.assert_allclose(mapped(motion["far"], was), now, atol=motion["far_residual_px"] + 0.1)
+
+
+def test_a_camera_that_stands_still_has_a_picture_that_stands_still():
+    motion = movement.picture_motion(FIELD, camera(), camera())
+    for name in ("ground", "far"):
+        np.testing.assert_allclose(motion[name], np.eye(3), atol=1e-6)
+
+
+def test_a_camera_that_looks_at_the_sky_has_no_ground():
+    up = camera("none", turned=(-0.9, 0, 0))
+    assert movement.picture_motion(FIELD, up, up)["ground"] is None
+
+
+def mapped(homography, places):
+    x, y, w = np.array(homography) @ np.column_stack([places, np.ones(len(places))]).T
+    return np.column_stack([x / w, y / w])
