@@ -34,6 +34,8 @@ from service.store.trend_charts import chart_columns, no_chart_columns
 from service.store.unreadable import MOST_FAULTS
 from service.store.venue_state import AnchorRow, Changes, NightRow, RevisionRow, StoredVenue, VenueState
 
+# Parts of a camera that a calibration finds, if not all of them.
+CAMERA_PARTS = ("pose", "intrinsics", "light")
 # The nights of each camera that are kept: three years of them.
 KEPT_NIGHTS = 1100
 
@@ -74,11 +76,7 @@ def with_result(venue: Venue, result: Result, cameras: Collection[str] | None = 
     `cameras`: only theirs; None: those of all.
     """
     found = {
-        camera.id: {
-            name: part
-            for name, part in (("pose", camera.pose), ("intrinsics", camera.intrinsics), ("light", camera.light))
-            if part is not None
-        }
+        camera.id: {part: value for part in CAMERA_PARTS if (value := getattr(camera, part)) is not None}
         for camera in result.cameras
         if cameras is None or camera.id in cameras
     }
