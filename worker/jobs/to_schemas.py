@@ -1,7 +1,5 @@
 """Conversion of the engine's answers to documents of the wire, and other parts that the kinds of jobs share."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -193,7 +191,7 @@ def _proposal(found: quality.CameraResult) -> Proposal | None:
     )
 
 
-def displacement_to_schema(pitch: Field, found: quality.CameraResult, anchor: Anchor | None) -> Displacement | None:
+def displacement_to_schema(pitch: Field, found: quality.CameraResult, anchor: "Anchor | None") -> Displacement | None:
     """Return the displacement of a camera from its anchor, or from itself without one; None if it is unknown."""
     reference = found.camera if anchor is None else camera_of(anchor.posed)
     moved = measure_displacement(pitch, reference, found)

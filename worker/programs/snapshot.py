@@ -4,8 +4,6 @@
 and prints a `SourceAnswer` per camera as it comes.
 """
 
-from __future__ import annotations
-
 import asyncio
 import os
 import sys
@@ -124,7 +122,7 @@ def _frame_of_stream(relay: Relay, task: SourceTask) -> bytes:
     return data.tobytes()
 
 
-def _pass_by_first_frames(stream: cv2.VideoCapture) -> None:
+def _pass_by_first_frames(stream: "cv2.VideoCapture") -> None:
     import cv2
 
     codec = int(stream.get(cv2.CAP_PROP_FOURCC)).to_bytes(4, "little").decode("latin-1").lower()
