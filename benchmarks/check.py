@@ -32,12 +32,14 @@ from benchmarks.rows import Rows
 from benchmarks.scenes import FOLDER as RUNS
 from fields.template import NAMES
 from models import MODEL_PATH
+from service.formats.records import CameraRecord
+from service.schemas.check import CheckedFile
 from service.schemas.field import FieldOfPlay
 from service.schemas.geometry import Intrinsics, Pose
 from testbed.spoiled_calibrations import spoiled_ways
 from worker.calibration.geometry.camera import Camera
 from worker.compute_resources import ComputeResources
-from worker.jobs.check import CheckedInput, solve
+from worker.jobs.check import solve
 
 THREADS = 2
 
@@ -48,7 +50,7 @@ class View:
 
     name: str
     field: FieldOfPlay
-    camera: CheckedInput
+    camera: CameraRecord
     frame: bytes
 
 
@@ -129,7 +131,8 @@ def _checked(view: View, way: str) -> dict:
     spoiled = spoiled_ways()[way]
     given = spoiled.spoil(view.camera, np.array([view.field.length_m, view.field.width_m]) / 2)
     begin, means = time.process_time(), ComputeResources(MODEL_PATH, THREADS)
-    (found,) = solve(view.field, [given], {given.id: [view.frame]}, 0, means, lambda _: None)
+    file = CheckedFile(field=view.field, seed=0, format="json", cameras=[given.to_check])
+    (found,) = solve(file, {given.id: [view.frame]}, means, lambda _: None).result.cameras
     causes = [cause.cause for cause in found.causes]
     return {
         "grade": found.grade,
@@ -159,12 +162,12 @@ def _clear_shots(name: str, count: int) -> list[Shot]:
     return clear
 
 
-def _input(camera: Camera) -> CheckedInput:
+def _input(camera: Camera) -> CameraRecord:
     """Return a camera as a file would have it."""
     lens, pose = camera.intrinsics, camera.pose
     intrinsics = Intrinsics(model=lens.model, matrix=lens.matrix.tolist(), distortion=lens.distortion.tolist())
     placed = Pose.from_position(pose.rotation.tolist(), pose.position.tolist())
-    return CheckedInput(camera.id, intrinsics, lens.size, placed)
+    return CameraRecord(camera.id, intrinsics, lens.size, placed)
 
 
 if __name__ == "__main__":

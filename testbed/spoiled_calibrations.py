@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from service.formats.records import CameraRecord
 from service.schemas.geometry import Intrinsics, Pose
 from worker.calibration.geometry import camera as engine
 from worker.calibration.geometry.rotation import rotation_matrices, rotation_vectors
-from worker.jobs.check import CheckedInput
 
 # Of a knock: mostly to the side, a little down and about the view.
 KNOCK = np.array([0.3, 1.0, 0.2]) / np.linalg.norm([0.3, 1.0, 0.2])
@@ -24,7 +24,7 @@ class Spoiled:
 
     grade: str
     causes: frozenset[str]
-    spoil: Callable[[CheckedInput, np.ndarray], CheckedInput]
+    spoil: Callable[[CameraRecord, np.ndarray], CameraRecord]
 
 
 def spoiled_ways() -> dict[str, Spoiled]:
@@ -62,7 +62,7 @@ def spoiled_ways() -> dict[str, Spoiled]:
 
 
 def _posed(grade: str, causes: set[str], change: Callable[..., tuple[np.ndarray, np.ndarray]]) -> Spoiled:
-    def spoil(one: CheckedInput, half: np.ndarray) -> CheckedInput:
+    def spoil(one: CameraRecord, half: np.ndarray) -> CameraRecord:
         pose = engine.Pose(np.array(one.pose.rotation), np.array(one.pose.position))
         rotation, position = change(pose.matrix, pose.position, half)
         turned = Pose.from_position(rotation_vectors(rotation).tolist(), np.asarray(position).tolist())
@@ -72,20 +72,20 @@ def _posed(grade: str, causes: set[str], change: Callable[..., tuple[np.ndarray,
 
 
 def _lensed(grade: str, causes: set[str], times: float) -> Spoiled:
-    def spoil(one: CheckedInput, half: np.ndarray) -> CheckedInput:
+    def spoil(one: CameraRecord, half: np.ndarray) -> CameraRecord:
         (fx, _, cx), (_, fy, cy), last = one.intrinsics.matrix
         return replace(one, intrinsics=_with(one.intrinsics, [[times * fx, 0, cx], [0, times * fy, cy], last]))
 
     return Spoiled(grade, frozenset(causes), spoil)
 
 
-def _halved(one: CheckedInput, half: np.ndarray) -> CheckedInput:
+def _halved(one: CameraRecord, half: np.ndarray) -> CameraRecord:
     (fx, _, cx), (_, fy, cy), last = one.intrinsics.matrix
     matrix = [[fx / 2, 0, (cx + 0.5) / 2 - 0.5], [0, fy / 2, (cy + 0.5) / 2 - 0.5], last]
     return replace(one, intrinsics=_with(one.intrinsics, matrix), size=(one.size[0] // 2, one.size[1] // 2))
 
 
-def _folding(one: CheckedInput, half: np.ndarray) -> CheckedInput:
+def _folding(one: CameraRecord, half: np.ndarray) -> CameraRecord:
     """The sixth order of a board that was only in the middle of the picture: the corners turn back."""
     distortion = [*one.intrinsics.distortion, *[0.0] * 5][:5]
     width = one.size[0] / one.intrinsics.matrix[0][0] / 2
