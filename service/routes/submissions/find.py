@@ -59,10 +59,8 @@ async def submit_camera_search(
     The result has candidates of each camera with pose and lens, and `candidate/{camera}/{number}.jpg` shows them.
     Nothing is stored by itself: `POST /venues/{id}/adopt-found` creates the venue or moves its cameras.
     """
-    await run_in_threadpool(forms.require_disk_space, context)
-    await run_in_threadpool(job_submission.require_queue_room, context, venue_id, "find", sender)
     most = MOST_CAMERAS * context.settings.max_frames_per_camera
-    async with forms.parsed_upload(request, context, most) as form:
+    async with forms.parsed_upload(request, context, venue_id, "find", sender, most) as form:
         return await run_in_threadpool(_submit, context, venue_id, form, sender)
 
 
