@@ -32,8 +32,7 @@ from benchmarks.rows import Rows
 from benchmarks.scenes import FOLDER as RUNS
 from fields.template import NAMES
 from models import MODEL_PATH
-from service.formats.records import CameraRecord
-from service.schemas.check import CheckedFile
+from service.schemas.check import CheckedCamera, CheckedFile
 from service.schemas.field import FieldOfPlay
 from service.schemas.geometry import Intrinsics, Pose
 from testbed.spoiled_calibrations import spoiled_ways
@@ -50,7 +49,7 @@ class View:
 
     name: str
     field: FieldOfPlay
-    camera: CameraRecord
+    camera: CheckedCamera
     frame: bytes
 
 
@@ -131,7 +130,7 @@ def _checked(view: View, way: str) -> dict:
     spoiled = spoiled_ways()[way]
     given = spoiled.spoil(view.camera, np.array([view.field.length_m, view.field.width_m]) / 2)
     begin, means = time.process_time(), ComputeResources(MODEL_PATH, THREADS)
-    file = CheckedFile(field=view.field, seed=0, format="json", cameras=[given.to_check])
+    file = CheckedFile(field=view.field, seed=0, format="opencv", cameras=[given])
     (found,) = solve(file, {given.id: [view.frame]}, means, lambda _: None).result.cameras
     causes = [cause.cause for cause in found.causes]
     return {
@@ -162,12 +161,12 @@ def _clear_shots(name: str, count: int) -> list[Shot]:
     return clear
 
 
-def _input(camera: Camera) -> CameraRecord:
+def _input(camera: Camera) -> CheckedCamera:
     """Return a camera as a file would have it."""
     lens, pose = camera.intrinsics, camera.pose
     intrinsics = Intrinsics(model=lens.model, matrix=lens.matrix.tolist(), distortion=lens.distortion.tolist())
     placed = Pose.from_position(pose.rotation.tolist(), pose.position.tolist())
-    return CameraRecord(camera.id, intrinsics, lens.size, placed)
+    return CheckedCamera(id=camera.id, image_size=[*lens.size], intrinsics=intrinsics, pose=placed)
 
 
 if __name__ == "__main__":

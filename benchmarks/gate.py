@@ -28,12 +28,13 @@ from demo.render import outdated
 from fields.template import load
 from models.training.pitches.conditions import Conditions
 from testbed.spoiling import blocked, fogged
+from testbed.synthetic import TAPED
 from worker.calibration.geometry.camera import Camera, Frame
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.parameters import with_focal_length
 
 RIDGE = np.array([[-18.5, 0.0, 0.3], [18.5, 0.0, 0.3]])
-PITCH = Field(105.0, 68.0, 0.12, RIDGE)
+PITCH = Field(105.0, 68.0, 0.12, RIDGE, sigma=TAPED)
 # Three on one mast whose neighbours share a strip, and whose outer two hardly share a line.
 ROW = Layout([(-0.5, -50.0, 14.0), (0.0, -50.0, 14.0), (0.5, -50.0, 14.0)], [(-42, -5), (0, -5), (42, -5)])
 RIGS = {"one": LAYOUTS["one"], "pair": LAYOUTS["pair"], "row of three": ROW, "four": LAYOUTS["four"]}
@@ -186,7 +187,7 @@ def _another_sport(take: Take, real: Sequence[Camera]) -> Taken:
 
 def _moved_lines(take: Take, real: Sequence[Camera]) -> Taken:
     """Touchlines repainted a metre farther in."""
-    narrower = Field(105.0, 66.0, 0.12, RIDGE)
+    narrower = Field(105.0, 66.0, 0.12, RIDGE, sigma=TAPED)
     return Taken({one.id: take(one, narrower, "narrower") for one in real}, frozenset(one.id for one in real))
 
 

@@ -24,11 +24,12 @@ from benchmarks.scenes import FOLDER, HOURS, SIZE, Scene, rendered, seen_well
 from benchmarks.truth import apart
 from demo.render import outdated
 from models.training.pitches.conditions import Conditions
+from testbed.synthetic import TAPED
 from worker.calibration.geometry.camera import Camera, Pose
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.lens import Intrinsics, Lens
 
-PITCH = Field(105.0, 68.0, 0.12, np.array([[-18.5, 0.0, 0.3], [18.5, 0.0, 0.3]]))
+PITCH = Field(105.0, 68.0, 0.12, np.array([[-18.5, 0.0, 0.3], [18.5, 0.0, 0.3]]), sigma=TAPED)
 FOCAL_LENGTHS = (2200.0, 4000.0, 6000.0)
 # What point of the ground a view looks at, and how many metres of it are as wide as the picture.
 VIEWS = {

@@ -18,6 +18,7 @@ import numpy as np
 from demo.render import outdated
 from models.training.pitches.conditions import Conditions
 from models.training.pitches.render import render_frame
+from testbed.synthetic import TAPED
 from worker.calibration.geometry.camera import Camera, Frame, Pose
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.lens import Intrinsics
@@ -87,7 +88,7 @@ def scene(name: str) -> Scene:
     layout, crown, light, matches = VENUES[name]
     number = list(VENUES).index(name)
     rng = np.random.default_rng([7, number])
-    pitch = Field(105.0, 68.0, 0.12, np.array([[-18.5, 0.0, crown], [18.5, 0.0, crown]]))
+    pitch = Field(105.0, 68.0, 0.12, np.array([[-18.5, 0.0, crown], [18.5, 0.0, crown]]), sigma=TAPED)
     believed = placed_cameras(LAYOUTS[layout], rng)
     real = believed if matches else [as_built(camera, rng) for camera in believed]
     drawn = Conditions.named(light, np.random.default_rng([8, number]))

@@ -42,12 +42,16 @@ FIFA's and World Rugby's tests allow a centimetre under a straightedge of three 
 
 @dataclass(frozen=True)
 class Extent:
-    """Default of a length of a field, and its least and largest values, in metres."""
+    """Default of a length of a field, and its least and largest values, in metres.
+
+    `chosen`: True if the rules leave it to each ground, so that a default is a guess.
+    """
 
     default: float
     least: float
     most: float
     what: str = ""
+    chosen: bool = False
 
 
 @dataclass(frozen=True)

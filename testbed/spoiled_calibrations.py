@@ -1,12 +1,12 @@
 """Calibrations as files have them that drifted or were written in another convention, with the cause of each."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from service.formats.records import CameraRecord
-from service.schemas.geometry import Intrinsics, Pose
+from service.schemas.check import CheckedCamera
+from service.schemas.geometry import Pose
 from worker.calibration.geometry import camera as engine
 from worker.calibration.geometry.rotation import rotation_matrices, rotation_vectors
 
@@ -24,7 +24,7 @@ class Spoiled:
 
     grade: str
     causes: frozenset[str]
-    spoil: Callable[[CameraRecord, np.ndarray], CameraRecord]
+    spoil: Callable[[CheckedCamera, np.ndarray], CheckedCamera]
 
 
 def spoiled_ways() -> dict[str, Spoiled]:
@@ -45,7 +45,9 @@ def spoiled_ways() -> dict[str, Spoiled]:
         "zoomed out by 10 %": _lensed("drifted", {"zoomed"}, 1.1),
         "of half the resolution": Spoiled("wrong", frozenset({"other-resolution"}), _halved),
         "matrix of half the resolution": Spoiled(
-            "wrong", frozenset({"other-resolution"}), lambda one, half: replace(_halved(one, half), size=one.size)
+            "wrong",
+            frozenset({"other-resolution"}),
+            _lens_halved,
         ),
         "folding": Spoiled("wrong", frozenset({"folds"}), _folding),
     }
@@ -62,36 +64,41 @@ def spoiled_ways() -> dict[str, Spoiled]:
 
 
 def _posed(grade: str, causes: set[str], change: Callable[..., tuple[np.ndarray, np.ndarray]]) -> Spoiled:
-    def spoil(one: CameraRecord, half: np.ndarray) -> CameraRecord:
+    def spoil(one: CheckedCamera, half: np.ndarray) -> CheckedCamera:
         pose = engine.Pose(np.array(one.pose.rotation), np.array(one.pose.position))
         rotation, position = change(pose.matrix, pose.position, half)
         turned = Pose.from_position(rotation_vectors(rotation).tolist(), np.asarray(position).tolist())
-        return replace(one, pose=turned)
+        return one.model_copy(update={"pose": turned})
 
     return Spoiled(grade, frozenset(causes), spoil)
 
 
 def _lensed(grade: str, causes: set[str], times: float) -> Spoiled:
-    def spoil(one: CameraRecord, half: np.ndarray) -> CameraRecord:
+    def spoil(one: CheckedCamera, half: np.ndarray) -> CheckedCamera:
         (fx, _, cx), (_, fy, cy), last = one.intrinsics.matrix
-        return replace(one, intrinsics=_with(one.intrinsics, [[times * fx, 0, cx], [0, times * fy, cy], last]))
+        return _lens_changed(one, [[times * fx, 0, cx], [0, times * fy, cy], last])
 
     return Spoiled(grade, frozenset(causes), spoil)
 
 
-def _halved(one: CameraRecord, half: np.ndarray) -> CameraRecord:
+def _halved(one: CheckedCamera, half: np.ndarray) -> CheckedCamera:
     (fx, _, cx), (_, fy, cy), last = one.intrinsics.matrix
     matrix = [[fx / 2, 0, (cx + 0.5) / 2 - 0.5], [0, fy / 2, (cy + 0.5) / 2 - 0.5], last]
-    return replace(one, intrinsics=_with(one.intrinsics, matrix), size=(one.size[0] // 2, one.size[1] // 2))
+    return _lens_changed(one, matrix, image_size=[side // 2 for side in one.image_size])
 
 
-def _folding(one: CameraRecord, half: np.ndarray) -> CameraRecord:
+def _lens_halved(one: CheckedCamera, half: np.ndarray) -> CheckedCamera:
+    return one.model_copy(update={"intrinsics": _halved(one, half).intrinsics})
+
+
+def _folding(one: CheckedCamera, half: np.ndarray) -> CheckedCamera:
     """The sixth order of a board that was only in the middle of the picture: the corners turn back."""
     distortion = [*one.intrinsics.distortion, *[0.0] * 5][:5]
-    width = one.size[0] / one.intrinsics.matrix[0][0] / 2
+    width = one.image_size[0] / one.intrinsics.matrix[0][0] / 2
     distortion[4] -= 0.35 / width**6
-    return replace(one, intrinsics=one.intrinsics.model_copy(update={"distortion": distortion}))
+    return one.model_copy(update={"intrinsics": one.intrinsics.model_copy(update={"distortion": distortion})})
 
 
-def _with(lens: Intrinsics, matrix: list[list[float]]) -> Intrinsics:
-    return lens.model_copy(update={"matrix": matrix, "sigma": None})
+def _lens_changed(one: CheckedCamera, matrix: list[list[float]], **changes: object) -> CheckedCamera:
+    lens = one.intrinsics.model_copy(update={"matrix": matrix, "sigma": None})
+    return one.model_copy(update={"intrinsics": lens, **changes})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import cv2
@@ -20,8 +21,10 @@ PAINTS = {
 }
 SKY = np.array([230, 200, 170], np.float32)
 
-PITCH = Field(105.0, 68.0)
-CROWNED = Field(105.0, 68.0, ridge=np.array([[-18.5, 0.0, 0.35], [18.5, 0.0, 0.35]]))
+# Of a field that somebody has measured, as the demo's venue says it.
+TAPED = {"length_m": 0.03, "width_m": 0.02}
+PITCH = Field(105.0, 68.0, sigma=TAPED)
+CROWNED = replace(PITCH, ridge=np.array([[-18.5, 0.0, 0.35], [18.5, 0.0, 0.35]]))
 BARREL = (-0.12, 0.02, 0.0, 0.0, 0.0)
 # Samples a side of a pixel, and pixels a side of a block.
 SAMPLES, BLOCK = 3, 4

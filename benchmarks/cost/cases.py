@@ -12,6 +12,7 @@ import numpy as np
 from benchmarks.scenes import SIZE, START_DEG, START_M, rendered
 from demo.render import outdated
 from models.training.pitches.conditions import Conditions
+from testbed.synthetic import TAPED
 from testbed.venue_documents import pose_document, venue_document
 from worker.calibration.geometry.camera import Camera, Pose
 from worker.calibration.geometry.field import Field
@@ -21,7 +22,7 @@ DEMO = Path(__file__).parents[2] / "demo"
 # How far off the stored poses are, metres and degrees: those of a quarter of an hour ago, and the paper's Start.
 STARTS = {"near": (0.005, 0.02), "start": (START_M, START_DEG)}
 DEMO_CAMERAS = "demo"
-PITCH = Field(105.0, 68.0, 0.12, np.array([[-18.5, 0.0, 0.3], [18.5, 0.0, 0.3]]))
+PITCH = Field(105.0, 68.0, 0.12, np.array([[-18.5, 0.0, 0.3], [18.5, 0.0, 0.3]]), sigma=TAPED)
 # Along the pitch (m), in the order in which cameras are added, on the near side and then on the far one.
 PLACES = [(x, side) for few in ((13.0, -13.0, 38.0, -38.0), (25.5, -25.5, 4.5, -4.5)) for side in (-1, 1) for x in few]
 SEED = 7

@@ -13,6 +13,7 @@ from benchmarks.scenes import LAYOUTS, Scene, as_built, placed_cameras
 from benchmarks.truth import apart, errors
 from demo.render import outdated
 from testbed.simulated_nights import SHARED_PX, Installation, Painted, SimulatedSight
+from testbed.synthetic import TAPED
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.field import Field
 
@@ -74,7 +75,7 @@ def nights(layout: str, number: int) -> Iterator[Night]:
     """The nights of one venue, whose lenses are as a good board leaves them."""
     rng = np.random.default_rng([19, VENUES.index(layout), number])
     crown = float(rng.uniform(*CROWNS_M))
-    pitch = Field(105.0, 68.0, 0.12, np.array([[-18.5, 0.0, crown], [18.5, 0.0, crown]]))
+    pitch = Field(105.0, 68.0, 0.12, np.array([[-18.5, 0.0, crown], [18.5, 0.0, crown]]), sigma=TAPED)
     believed = placed_cameras(LAYOUTS[layout], rng)
     built = [as_built(camera, rng) for camera in believed]
     painted = Painted.drawn(pitch, rng)

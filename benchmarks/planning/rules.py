@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from benchmarks.printing import table_head
+from testbed.synthetic import TAPED
 from worker.calibration.geometry.camera import Camera, Pose
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.lens import Intrinsics
@@ -15,7 +16,7 @@ from worker.calibration.planning.line_state import STATES, StateName
 from worker.calibration.planning.plan import Plan, plan
 from worker.calibration.planning.variations import panned
 
-PITCH = Field(105.0, 68.0, 0.12, np.array([[-18.5, 0.0, 0.3], [18.5, 0.0, 0.3]]))
+PITCH = Field(105.0, 68.0, 0.12, np.array([[-18.5, 0.0, 0.3], [18.5, 0.0, 0.3]]), sigma=TAPED)
 
 
 @dataclass(frozen=True)

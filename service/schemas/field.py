@@ -189,9 +189,9 @@ class FieldOfPlay(Schema):
     )
     sigma: dict[FieldNumber, Annotated[Number, Field(gt=0, le=MOST_SIGMA_M)]] = Field(
         {},
-        description="Uncertainty of the field's dimensions: one standard deviation by name, m. Absent: that of a "
-        "careful tape measurement for length and width (0.03 %), and 0.02 for the ridge. Give it if nobody has "
-        "measured the field: the sigma of poses then includes it.",
+        description="Uncertainty of the field's dimensions: one standard deviation by name, m. Absent: 0.02 for the "
+        "ridge, and that of a careful tape measurement for length and width (0.03 %). Where the rules leave these to "
+        "each ground, it is that of their last digit: 105 is known to 0.29, 104.6 to 0.03. Poses include it.",
         examples=[{"length_m": 0.5, "width_m": 0.5}],
     )
     other_markings: Annotated[list[OtherMarking], Field(max_length=500)] = Field(
@@ -302,10 +302,16 @@ class FieldOfPlay(Schema):
         if not assumed:
             return []
         measures = " and ".join(f"{name} {getattr(self, name):g}" for name in assumed)
-        unmeasured = ", ".join(f'"{name}": 1' for name in assumed)
+        is_guess = not self.sigma and any(usual[TEMPLATE_MEASURES[name]].chosen for name in assumed)
+        example = ", ".join(f'"{name}": {0.05 if is_guess else 1}' for name in assumed)
+        if is_guess:
+            return [
+                f"field: {measures}, as is usual for {self.template}, are taken to be as good as their digits, which "
+                f"poses are then no better than: if somebody has measured this one, say how well by sigma {{{example}}}"
+            ]
         return [
             f"field: {measures}, as is usual for {self.template}, are taken for measured, to 0.03 %: if nobody has "
-            f"measured this one, say so by sigma {{{unmeasured}}}, or how well somebody has"
+            f"measured this one, say so by sigma {{{example}}}, or how well somebody has"
         ]
 
     @property

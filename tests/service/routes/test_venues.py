@@ -48,13 +48,14 @@ def test_a_lens_of_which_nobody_says_how_well_it_is_known_is_said_to_be_taken_fo
     assert "warnings" not in service.http.get(f"/venues/{name}").json()
 
 
-def test_a_field_of_the_usual_size_that_nobody_vouches_for_is_said_to_be_taken_for_measured(service, name):
+def test_a_field_of_the_usual_size_that_nobody_vouches_for_is_said_to_be_a_guess(service, name):
     document = venue(name, cameras=("left",))
     document["cameras"][0]["intrinsics"]["sigma"] = {"fx": 0.5}
     (warning,) = service.http.put(f"/venues/{name}", json=document).json()["warnings"]
     assert warning == (
-        "field: length_m 105 and width_m 68, as is usual for football, are taken for measured, to 0.03 %: if nobody "
-        'has measured this one, say so by sigma {"length_m": 1, "width_m": 1}, or how well somebody has'
+        "field: length_m 105 and width_m 68, as is usual for football, are taken to be as good as their digits, which "
+        "poses are then no better than: if somebody has measured this one, say how well by sigma "
+        '{"length_m": 0.05, "width_m": 0.05}'
     )
     (of_width,) = patched(service, name, {"field": {"length_m": 104.2}}).json()["warnings"]
     assert of_width.startswith("field: width_m 68, as")

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from testbed.parameters import try_first
-from testbed.synthetic import CROWNED, camera, moved, paint_frame
+from testbed.synthetic import CROWNED, TAPED, camera, moved, paint_frame
 from tests.scenes import plane
 from tests.worker.calibration.outdated_pair import white_on_green
 from worker.calibration import steps, wide_path
@@ -21,7 +21,7 @@ pytestmark = pytest.mark.slow
 ZOOM = 0.015
 BOARD = {"fx": 0.6, "fy": 0.6}
 """A good board's, px."""
-SQUARE = replace(CROWNED, sigma={"skew_m": 1e-3})
+SQUARE = replace(CROWNED, sigma=TAPED | {"skew_m": 1e-3})
 """The field, whose right angles are known: the lens alone is in doubt."""
 WIND = ((2e-4, -1e-4, 1e-4), (0.01, 0.0, -0.01))
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from service.schemas.lens_limits import BOARD_FOCAL_PERCENT
+from testbed.synthetic import TAPED
 from worker.calibration.detection.evidence import Evidence
 from worker.calibration.detection.view_condition import ViewCondition, ViewFigures
 from worker.calibration.diagnostics.overlap import Overlap
@@ -18,7 +19,7 @@ from worker.calibration.geometry.parameters import BOARD_FOCAL, with_lens_change
 from worker.calibration.refinement.uncertainty import LensChange, PoseAndLens
 from worker.jobs.nights import lens_change_in_words, lens_change_to_schema, read_memories, refined_to_schema
 
-PITCH = Field(105.0, 68.0)
+PITCH = Field(105.0, 68.0, sigma=TAPED)
 LENS = Intrinsics(np.array([[2000.0, 0, 1920], [0, 2000, 1080], [0, 0, 1]]), np.zeros(4), (3840, 2160), {"fx": 5.0})
 CAMERA = Camera("left", LENS, Pose.looking_at([0.0, -50.0, 10.0], [0.0, 0.0, 0.0]))
 NOVEMBER, TONIGHT = (datetime(2026, 11, day, 2, tzinfo=UTC) for day in (3, 23))

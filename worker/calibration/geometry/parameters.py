@@ -2,7 +2,8 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from math import hypot
+from decimal import Decimal
+from math import hypot, sqrt
 from typing import Self
 
 import numpy as np
@@ -207,7 +208,30 @@ def field_parameters(pitch: Field) -> list[FieldParameter]:
 
 
 def _known(pitch: Field) -> dict[str, float]:
-    return careful_measurement(pitch) | dict(pitch.sigma)
+    return careful_measurement(pitch) | _as_written(pitch) | dict(pitch.sigma)
+
+
+def _as_written(pitch: Field) -> dict[str, float]:
+    """Return the sigma (m) of a size that each ground chooses and nobody says to have measured.
+
+    It is as good as its digits: 105 m may be a default, 104.63 m is not. The right angles are those of a triangle of
+    3, 4 and 5 m that closes to a centimetre.
+    """
+    if pitch.sigma:
+        return {}
+    care = careful_measurement(pitch)
+    written = {
+        f"{name}_m": max(care[f"{name}_m"], _rounding(getattr(pitch, name)))
+        for name, extent in pitch.template.size.items()
+        if name in ("length", "width") and extent.chosen
+    }
+    return written | ({"skew_m": max(care["skew_m"], 0.002 * pitch.width / 2)} if written else {})
+
+
+def _rounding(value: float) -> float:
+    """Return the standard deviation of what a number loses where it ends after its last digit, at most after a one."""
+    exponent = Decimal(repr(value)).normalize().as_tuple().exponent
+    return float(10.0 ** min(int(exponent), 0) / sqrt(12))
 
 
 def with_focal_length(camera: Camera, longer_px: float) -> Camera:

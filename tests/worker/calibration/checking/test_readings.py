@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from service.formats.records import CameraRecord
+from service.schemas.check import CheckedCamera
 from service.schemas.geometry import Intrinsics
 from service.schemas.geometry import Pose as PoseSchema
 from testbed.spoiled_calibrations import spoiled_ways
@@ -37,7 +37,9 @@ def test_what_was_written_in_another_convention_is_read_by_naming_it(name, x, y,
     true = Pose.looking_at([x, y, z], [aim, 0.0, 0.0], roll)
     lens = Intrinsics(matrix=[[900, 0, 640], [0, 900, 360], [0, 0, 1]], distortion=[])
     pose = PoseSchema.from_position(true.rotation.tolist(), true.position.tolist())
-    written = POSE_WAYS[name].spoil(CameraRecord("left", lens, (1280, 720), pose), HALF).pose
+    written = (
+        POSE_WAYS[name].spoil(CheckedCamera(id="left", image_size=[1280, 720], intrinsics=lens, pose=pose), HALF).pose
+    )
     given_pose = Pose(np.array(written.rotation), np.array(written.position))
     named = [reading for reading in ALL if set(reading.causes) == POSE_WAYS[name].causes]
     assert any(

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from testbed.simulated_nights import SHARED_PX, Installation, Painted, SimulatedSight
+from testbed.synthetic import TAPED
 from worker.calibration.detection.line_measurement import Measurements
 from worker.calibration.gate.quality import CameraResult
 from worker.calibration.geometry.camera import Camera, Pose
@@ -16,7 +17,7 @@ from worker.calibration.geometry.lens import Intrinsics
 from worker.calibration.geometry.parameters import with_focal_length
 from worker.calibration.memory.camera_memory import AcceptedJob
 
-PITCH = Field(105.0, 68.0, 0.12, np.array([[-18.5, 0.0, 0.3], [18.5, 0.0, 0.3]]))
+PITCH = Field(105.0, 68.0, 0.12, np.array([[-18.5, 0.0, 0.3], [18.5, 0.0, 0.3]]), sigma=TAPED)
 LINES = PITCH.line_points()
 SIZE = (3840, 2160)
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from fields.template import load
 from testbed.simulated_nights import Painted, SimulatedSight
-from testbed.synthetic import camera, pair
+from testbed.synthetic import TAPED, camera, pair
 from worker.calibration.geometry.camera import Camera, Pose
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.parameters import lens_parameters, with_lens_changed
@@ -19,7 +19,7 @@ from worker.calibration.planning.plan import plan
 from worker.calibration.refinement.expected_errors import ErrorModel
 from worker.calibration.refinement.refine import refine
 
-PITCH = Field(105.0, 68.0)
+PITCH = Field(105.0, 68.0, sigma=TAPED)
 SIZE = (1920, 1080)
 FRESH = STATES["fresh"]
 FEW = settings(max_examples=3, deadline=None, derandomize=True)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from testbed.simulated_nights import SHARED_PX, Painted, SimulatedSight
+from testbed.synthetic import TAPED
 from tests.worker.calibration.memory.nights import LINES, PITCH, box_camera
 from worker.calibration.geometry.derivatives import moved
 from worker.calibration.geometry.far_marking import far_marking_shift_m
@@ -14,7 +15,7 @@ from worker.calibration.refinement.cross_check import cross_check
 from worker.calibration.refinement.refine import refine
 
 NIGHTS = 12
-SQUARE = replace(PITCH, sigma={"skew_m": 1e-3})
+SQUARE = replace(PITCH, sigma=TAPED | {"skew_m": 1e-3})
 """The pitch, whose right angles are known."""
 
 
