@@ -7,12 +7,13 @@ import sys
 from collections.abc import Iterable, Sequence
 from fractions import Fraction
 from pathlib import Path
-from typing import Annotated, TypeVar
+from typing import Annotated, Any, TypeVar
 
 import typer
 from pydantic import BaseModel, ValidationError
 
 from service.cli.printing import FAILED, USAGE, fail
+from service.schemas.field import FieldOfPlay
 from service.schemas.findings import describe_errors
 from service.schemas.names import ID_IN_WORDS, ID_PATTERN, JOB_ID_PATTERN, FormatName, LensChoice, Projection
 from service.schemas.options import Options
@@ -79,6 +80,11 @@ def require_folder_of(file: Path) -> Path:
     return file
 
 
+Sport = Annotated[str | None, typer.Option("--sport", help="Sport of the field: football, tennis ...")]
+FieldSize = Annotated[
+    str | None,
+    typer.Option("--field", metavar="LENGTHxWIDTH", help="Size of the field, m; otherwise the sport's usual one."),
+]
 Url = Annotated[
     str,
     typer.Option(
@@ -220,6 +226,17 @@ def parse_document(model: type[M], document: str | bytes, source: str, example: 
         messages = describe_errors(found, model, json.loads(document) if is_json else None)
         lines = [f"{source}: {message}" for message in messages]
         fail("\n".join([*lines, f"Expected is {example}"] if example else lines), USAGE)
+
+
+def parse_field(sport: str, size: str | None) -> FieldOfPlay:
+    """Return the field of a sport, of its usual size unless one is given (LENGTHxWIDTH, m)."""
+    field: dict[str, Any] = {"template": sport}
+    if size is not None:
+        match = re.fullmatch(r"(\d+(?:\.\d+)?)[x×](\d+(?:\.\d+)?)", size)
+        if match is None:
+            fail(f"--field {size}: expected LENGTHxWIDTH in metres, for instance 105x68", USAGE)
+        field |= {"length_m": float(match[1]), "width_m": float(match[2])}
+    return parse_document(FieldOfPlay, json.dumps(field), "--sport")
 
 
 def require_cameras(venue: Venue, named: Iterable[str]) -> None:

@@ -1,7 +1,6 @@
 """`esc check`: is a calibration, whoever made it, still good on this picture? Without a venue and a service."""
 
 import json
-import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
@@ -9,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from service.cli.answers import exit_code_of_grade, print_checks, print_json
-from service.cli.arguments import parse_document, parse_frame_files
+from service.cli.arguments import FieldSize, Sport, parse_document, parse_field, parse_frame_files
 from service.cli.convert import read_calibration, write_calibration
 from service.cli.local_engine import engine_progress, engine_settings, report_job_failures
 from service.cli.printing import USAGE, fail, print_note
@@ -28,11 +27,8 @@ def check(
             help="A calibration of any format that `esc convert` reads, and a JPEG or PNG of each camera to check.",
         ),
     ],
-    sport: Annotated[str | None, typer.Option("--sport", help="Sport of the field: football, tennis ...")] = None,
-    size: Annotated[
-        str | None,
-        typer.Option("--field", metavar="LENGTHxWIDTH", help="Size of the field, m; otherwise the sport's usual one."),
-    ] = None,
+    sport: Sport = None,
+    size: FieldSize = None,
     site: Annotated[
         Path | None,
         typer.Option(
@@ -90,13 +86,7 @@ def _parse_field(sport: str | None, size: str | None, site: Path) -> FieldOfPlay
         if described is None or size is not None:
             fail("Say the sport of the field: --sport football, or --site with a venue's file", USAGE)
         return parse_document(FieldOfPlay, json.dumps(described), f"{site}, field")
-    field: dict[str, Any] = {"template": sport}
-    if size is not None:
-        match = re.fullmatch(r"(\d+(?:\.\d+)?)[x×](\d+(?:\.\d+)?)", size)
-        if match is None:
-            fail(f"--field {size}: expected LENGTHxWIDTH in metres, for instance 105x68", USAGE)
-        field |= {"length_m": float(match[1]), "width_m": float(match[2])}
-    return parse_document(FieldOfPlay, json.dumps(field), "--sport")
+    return parse_field(sport, size)
 
 
 def _field_of(site: Path) -> Any:

@@ -15,6 +15,7 @@ from service.cli.arguments import (
     ApiKey,
     AsJson,
     FieldOfView,
+    FieldSize,
     FormatOption,
     Height,
     Horizon,
@@ -22,19 +23,23 @@ from service.cli.arguments import (
     OneCamera,
     Output,
     ProjectionOption,
+    Sport,
     Url,
     VenueId,
     Yes,
     parse_document,
+    parse_field,
     require_yes,
 )
+from service.cli.convert import read_calibration
 from service.cli.printing import FAILED, USAGE, fail, print_note, print_rows, write_document
 from service.cli.service_client import open_client
 from service.cli.venue_edits import describe_losses, edit_text, merge_patch_between, parse_patch, with_poses_of
 from service.cli.venue_find import adopt, find_cameras
 from service.cli.venue_reports import follow_venue, venue_health, venue_history, venue_trend
 from service.client import Client, Refused
-from service.schemas.names import StitchFormat
+from service.schemas.field import FieldOfPlay
+from service.schemas.names import StitchFormat, id_like
 from service.schemas.venue import Venue, VenueIn
 
 WAYS_TO_PUT = (
@@ -45,7 +50,19 @@ app = typer.Typer(no_args_is_help=True, help="Venues: pitch, cameras, stored pos
 
 @app.command("put")
 def put_venue(
-    file: Annotated[Path, typer.Argument(metavar="FILE", exists=True, dir_okay=False, help="JSON file of a venue.")],
+    file: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FILE",
+            exists=True,
+            help="JSON file of a venue; with --sport, a calibration of any tool that `esc convert` reads.",
+        ),
+    ],
+    sport: Sport = None,
+    size: FieldSize = None,
+    id: Annotated[
+        str | None, typer.Option("--id", help="With --sport: id of the venue; otherwise the file's name.")
+    ] = None,
     keep_poses: Annotated[
         bool,
         typer.Option(
@@ -57,8 +74,14 @@ def put_venue(
     url: Url = DEFAULT_URL,
     api_key: ApiKey = None,
 ) -> None:
-    """Create or replace a venue from a JSON file. Exit 1: nothing was put, something would be lost by it."""
-    venue = parse_document(VenueIn, file.read_bytes(), str(file))
+    """Create or replace a venue from a file. Exit 1: nothing was put, something would be lost by it.
+
+    The world of a calibration has to begin in the middle of the field, as `esc check -o` writes it.
+    """
+    if sport is None:
+        venue = parse_document(VenueIn, file.read_bytes(), str(file))
+    else:
+        venue = _venue_of_calibration(file, parse_field(sport, size), id or id_like(file.stem))
     with open_client(url, api_key) as client:
         before = _stored_venue(client, venue.id)
         if before is None:
@@ -70,6 +93,18 @@ def put_venue(
         if losses and not force:
             fail("\n  ".join([f"Nothing was put. Venue {venue.id} would lose", *losses, WAYS_TO_PUT]), FAILED)
         print_answer(client.put_venue(new, tag), as_json=as_json)
+
+
+def _venue_of_calibration(file: Path, field: FieldOfPlay, id: str) -> VenueIn:
+    """Return a venue with the cameras of a calibration, or exit with what it lacks."""
+    found = read_calibration([file])
+    for camera in found.cameras:
+        if camera.pose is None or camera.size is None:
+            lacking = "pose" if camera.pose is None else "picture size"
+            fail(f"{file}, camera {camera.id}: expected a {lacking}, got none; esc venue find needs none", USAGE)
+    cameras = [one.to_check.model_dump(mode="json") for one in found.cameras]
+    document = {"id": id, "field": field.model_dump(mode="json"), "cameras": cameras}
+    return parse_document(VenueIn, json.dumps(document), str(file))
 
 
 @app.command("set")
