@@ -1,6 +1,7 @@
 """`esc run`: the calibration of a venue's file, without a service."""
 
 import secrets
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -9,9 +10,10 @@ import typer
 from service.cli.answers import print_answer, write_pictures
 from service.cli.arguments import AnswerAsJson, Frames, OptionsText, parse_document, parse_options
 from service.cli.local_engine import checked_files, engine_progress, engine_settings
-from service.cli.printing import ACCEPTED, REJECTED, print_note
+from service.cli.printing import ACCEPTED, REJECTED, USAGE, fail, print_note
 from service.schemas.results import Result
 from service.schemas.venue import VenueIn
+from service.store.jobs.files import BIRDSEYE, OF_CAMERA, STITCHED, names_of_all
 
 
 def run(
@@ -26,6 +28,14 @@ def run(
         Path, typer.Option("-o", "--output", file_okay=False, help="Folder for result.json and the pictures.")
     ],
     options: OptionsText = "{}",
+    pictures: Annotated[
+        str,
+        typer.Option(
+            metavar="KIND,...",
+            help="Pictures to draw, which takes longer than the calibration: preview, preview_before, seam, birdseye, "
+            "and overlay, frame, stored and new of each camera; or all, or none.",
+        ),
+    ] = "preview,overlay",
     debug: Annotated[
         Path | None,
         typer.Option(
@@ -47,7 +57,6 @@ def run(
     stored = parse_document(VenueIn, venue.read_bytes(), str(venue)).to_venue()
     if job_options.seed is None:
         job_options = job_options.model_copy(update={"seed": secrets.randbelow(2**31)})
-    job_options = job_options.model_copy(update={"pictures": True})
     files = checked_files(stored, frames, settings)
     resources, recorder = ComputeResources.of(settings), NOT_RECORDED if debug is None else DebugRecorder()
     try:
@@ -59,6 +68,7 @@ def run(
                 resources,
                 show,
                 recorder=recorder,
+                pictures=_names_of(pictures, [camera.id for camera in stored.cameras]),
             )
     finally:
         # The records of the stages before a failure show its cause.
@@ -71,3 +81,15 @@ def run(
     (output / "result.json").write_text(result.model_dump_json(indent=2) + "\n")
     print_answer(result, as_json=as_json)
     raise typer.Exit(ACCEPTED if result.accepted else REJECTED)
+
+
+def _names_of(kinds: str, cameras: Sequence[str]) -> list[str]:
+    """Return the names of the pictures of these kinds, or exit with those there are."""
+    wanted = [] if kinds == "none" else kinds.split(",")
+    known = (*STITCHED, *BIRDSEYE, *OF_CAMERA)
+    if unknown := [kind for kind in wanted if kind not in ("all", *known)]:
+        fail(f"--pictures {unknown[0]}: expected all, none, or some of {', '.join(known)}", USAGE)
+    if "all" in wanted:
+        return names_of_all(cameras)
+    of_cameras = [f"{kind}_{camera}" for kind in wanted if kind in OF_CAMERA for camera in cameras]
+    return [kind for kind in wanted if kind not in OF_CAMERA] + of_cameras

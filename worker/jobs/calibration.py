@@ -74,9 +74,11 @@ def solve(
     report: Callable[[Progress], None],
     nights: NightHistory = NO_HISTORY,
     recorder: engine.Recorder = engine.NOT_RECORDED,
+    pictures: Sequence[str] | None = None,
 ) -> Solution[Result]:
     """Calibrate a venue from the files of its cameras, by what is known of its `nights`.
 
+    `pictures`: names of those to draw, by `names_of_all`; None: as the options say.
     `venue` and `options` may be models or documents of `worker.jobs.documents`; the result is a document.
     """
     job = FramesJob.prepare(venue, files, options, means, report)
@@ -96,22 +98,27 @@ def solve(
         )
     steadied = _steadied(venue, found)
     with job.drawing(found.timings):
-        pictures, later = _draw(job, found, options, steadied)
+        drawn, later = _draw(job, found, options, steadied, pictures)
     remembered = memories if options.dry_run else {**memories, **found.memories}
     result = _result(job, venue, options, found, steadied, remembered, nights)
     accepted_memories = {camera: memory.to_json() for camera, memory in found.memories.items()}
-    return Solution(_refused_in_part(venue, options, result), pictures, later, accepted_memories)
+    return Solution(_refused_in_part(venue, options, result), drawn, later, accepted_memories)
 
 
 def _draw(
-    job: FramesJob, found: engine.Calibration, options: Options, lights: Mapping[str, Light]
+    job: FramesJob,
+    found: engine.Calibration,
+    options: Options,
+    lights: Mapping[str, Light],
+    names: Sequence[str] | None,
 ) -> tuple[dict[str, bytes], Sequence[str]]:
     """Return the pictures that only this job can draw, and the names of those that are drawn when somebody looks.
 
-    All are drawn at once where `options` say so, or where a camera was rejected: somebody will want to see why.
+    Without `names`, all are drawn at once where `options` say so, or where a camera was rejected: somebody will want to
+    see why.
     """
     seen = masks(job.cameras, found.responses)
-    if found.accepted and not options.pictures:
+    if names is None and found.accepted and not options.pictures:
         return seen, names_of_all([camera.id for camera in job.cameras])
     # Most jobs draw nothing.
     from worker.jobs.pictures import PictureInputs, draw
@@ -123,7 +130,7 @@ def _draw(
         {result.camera.id: result.markings for result in found.cameras},
         lights,
     )
-    return draw(scene, scene.names) | seen, ()
+    return draw(scene, scene.names if names is None else names) | seen, ()
 
 
 def _steadied(venue: Venue, found: engine.Calibration) -> dict[str, Light]:

@@ -45,15 +45,15 @@ class PictureInputs:
 
 
 def draw(scene: PictureInputs, names: Sequence[str]) -> dict[str, bytes]:
-    """Draw pictures; return the files by name, with those that are drawn together with the wanted ones."""
+    """Draw the pictures of these names; return the files by name."""
     parts: list[Callable[[], dict[str, bytes]]] = []
     if {*names} & {*STITCHED}:
-        parts.append(partial(_stitched, scene))
+        parts.append(partial(_stitched, scene, names))
     if {*names} & {*BIRDSEYE}:
         parts.append(partial(_birdseye, scene))
     for number, camera in enumerate(scene.stored[1]):
         if {*names} & {f"{kind}_{camera.id}" for kind in OF_CAMERA}:
-            parts.append(partial(_of_camera, scene, number))
+            parts.append(partial(_of_camera, scene, number, names))
     pictures: dict[str, bytes] = {}
     for part in parts:
         try:
@@ -63,35 +63,41 @@ def draw(scene: PictureInputs, names: Sequence[str]) -> dict[str, bytes]:
     return pictures
 
 
-def _stitched(scene: PictureInputs) -> dict[str, bytes]:
-    """Draw the stitched view by the new poses, its seams, and the view by the stored poses."""
+def _stitched(scene: PictureInputs, names: Sequence[str]) -> dict[str, bytes]:
+    """Draw the stitched view by the new poses, and its seams and the view by the stored poses where wanted."""
     view = chosen_view(*scene.found, ViewChoice(width=PREVIEW_WIDTH))
+    standings = {"preview": scene.found, "preview_before": scene.stored}
+    wanted = {name: standing for name, standing in standings.items() if name == "preview" or name in names}
     # Somebody may wait, and each of them keeps a core busy.
-    with ThreadPoolExecutor(2) as both:
-        after, before = both.map(
+    with ThreadPoolExecutor(len(wanted)) as both:
+        stitched = both.map(
             lambda standing: stitched_pictures.stitched(standing[0], view, standing[1], scene.frames, scene.lights),
-            (scene.found, scene.stored),
+            wanted.values(),
         )
-    return {
-        "preview": encode_jpeg(after.picture),
-        "seam": encode_png(layers.seam_layer(after.owner)),
-        "preview_before": encode_jpeg(before.picture),
-    }
+        drawn = dict(zip(wanted, stitched, strict=True))
+    pictures = {name: encode_jpeg(one.picture) for name, one in drawn.items()}
+    if "seam" in names:
+        pictures["seam"] = encode_png(layers.seam_layer(drawn["preview"].owner))
+    return pictures
 
 
 def _birdseye(scene: PictureInputs) -> dict[str, bytes]:
     return {"birdseye": encode_jpeg(stitched_pictures.birdseye(*scene.found, scene.frames, evened=scene.lights))}
 
 
-def _of_camera(scene: PictureInputs, number: int) -> dict[str, bytes]:
-    """Draw a frame with both fields and faults of markings on it, and a smaller one with its layers."""
+def _of_camera(scene: PictureInputs, number: int, names: Sequence[str]) -> dict[str, bytes]:
+    """Draw what is wanted of a camera: its frame with both fields and faults of markings, a smaller one, its layers."""
     stored, new = ((pitch, cameras[number]) for pitch, cameras in (scene.stored, scene.found))
     camera, size = stored[1].id, size_as_shown(stored[1])
     frame = scene.frames[camera]
-    small = np.asarray(cv2.resize(frame, size, interpolation=cv2.INTER_AREA), np.uint8)
-    return {
-        f"overlay_{camera}": encode_jpeg(overlay(stored, new, frame, seen=scene.markings[camera])),
-        f"frame_{camera}": encode_jpeg(small, FRAME_QUALITY),
-        f"stored_{camera}": encode_png(layers.stored_layer(*stored, size)),
-        f"new_{camera}": encode_png(layers.new_layer(*new, size)),
+
+    def small() -> Picture:
+        return np.asarray(cv2.resize(frame, size, interpolation=cv2.INTER_AREA), np.uint8)
+
+    ways: dict[str, Callable[[], bytes]] = {
+        f"overlay_{camera}": lambda: encode_jpeg(overlay(stored, new, frame, seen=scene.markings[camera])),
+        f"frame_{camera}": lambda: encode_jpeg(small(), FRAME_QUALITY),
+        f"stored_{camera}": lambda: encode_png(layers.stored_layer(*stored, size)),
+        f"new_{camera}": lambda: encode_png(layers.new_layer(*new, size)),
     }
+    return {name: draw_it() for name, draw_it in ways.items() if name in names}

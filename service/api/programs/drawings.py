@@ -51,7 +51,7 @@ class Drawings:
         if job is None or None in frames.values():
             return None
         files = {camera: frame for camera, frame in frames.items() if frame is not None}
-        asked = DrawingRequest.of(job.venue, job.result, [name], self._settings.threads)
+        asked = DrawingRequest.of(job.venue, job.result, drawn_together(name), self._settings.threads)
         program, environment = self._settings.picture_program, self._settings.native_environment
         output = run_program("picture", program, environment, asked.encode(files), LONGEST_S)
         _, drawn = ProgramMessage.decode(output)

@@ -64,7 +64,7 @@ def look(drawn_by, stock, job, *names):
 def test_a_picture_is_drawn_when_somebody_first_looks_and_then_kept(stock, drawing, job, tmp_path):
     assert look(drawing(), stock, job, "preview") == [b"preview:frame"]
     assert look(drawing(), stock, job, "preview", "birdseye") == [b"preview:frame", b"birdseye:frame"]
-    assert (tmp_path / "drawn").read_text().split() == ["preview", "birdseye"]
+    assert (tmp_path / "drawn").read_text().splitlines() == ["preview preview_before seam", "birdseye"]
     assert stock.blobs.get(f"{stock.jobs.pictures(job).folder}/preview.jpg") == b"preview:frame"
 
 

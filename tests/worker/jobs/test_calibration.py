@@ -233,6 +233,12 @@ def test_the_outcome_is_what_was_found_with_pictures_and_provenance(venue, files
 
 
 @pytest.mark.usefixtures("drawn")
+def test_only_the_pictures_are_drawn_that_are_named(venue, files, means):
+    outcome = solve(venue, files, Options(seed=7), means, lambda _: None, pictures=["preview", "overlay_left"])
+    assert set(outcome.pictures) - MASKS == {"preview", "overlay_left"}
+
+
+@pytest.mark.usefixtures("drawn")
 def test_pictures_of_poses_that_are_accepted_wait_for_who_looks_but_for_what_the_network_saw(
     venue, files, asked, means
 ):
@@ -272,7 +278,7 @@ def test_a_picture_drawn_later_is_the_one_that_the_job_draws(venue, files, asked
     drawn_later = drawn_by_a_process if options == Options() else drawn_here
     for name in ("preview", "birdseye", "frame_left", "frame_right"):
         needed = {camera: file for camera, file in first.items() if not name.startswith("frame") or camera in name}
-        given = DrawingRequest.of(venue, outcome.result, [name], 1)
+        given = DrawingRequest.of(venue, outcome.result, drawn_together(name), 1)
         drawn = drawn_later(given, needed)
         assert set(drawn) == set(drawn_together(name))
         assert all(picture == outcome.pictures[each] for each, picture in drawn.items())
