@@ -54,6 +54,7 @@ from service.schemas.names import (
     LensChoice,
     StitchFormat,
 )
+from service.schemas.plan import LineStateName, PlanAnswer, PlannedSite
 from service.schemas.trend import Trend
 from service.schemas.venue import ChangedVenue, RestoredVenue, Venue, VenueIn, Venues
 
@@ -67,6 +68,8 @@ SILENCE_S = 45.0
 AGAIN_S = 2.0
 # A view of 8192 pixels and many cameras takes minutes.
 PACKAGE_S = 180.0
+# A dozen cameras on a busy machine.
+PLAN_S = 150.0
 # A report is out of date by then.
 REPORT_S = 5.0
 NOTHING: Mapping[str, Any] = MappingProxyType({})
@@ -312,6 +315,11 @@ class AsyncClient:
         sent["files"] += [(CALIBRATION_PART, (path.name, path.read_bytes(), OCTETS)) for path in calibration]
         return await self._call(Job, "POST", "/check", **sent)
 
+    async def plan(self, site: PlannedSite, lines: LineStateName = "fresh", hidden: float = 0.0) -> PlanAnswer:
+        """Return the plan of cameras before they are mounted, for lines of which something covers a share `hidden`."""
+        sent = {"params": {"lines": lines, "hidden": hidden}, "json": site.model_dump(mode="json"), "timeout": PLAN_S}
+        return await self._call(PlanAnswer, "POST", "/plan", **sent)
+
     async def job(self, job_id: str, wait_s: float = 0) -> Job:
         """Return a job, at its end or after `wait_s`."""
         params = {"wait": wait_s} if wait_s else {}
@@ -484,6 +492,7 @@ class Client:
     fit_field = blocking(AsyncClient.fit_field)
     find = blocking(AsyncClient.find)
     check = blocking(AsyncClient.check)
+    plan = blocking(AsyncClient.plan)
     job = blocking(AsyncClient.job)
     jobs = blocking(AsyncClient.jobs)
     again = blocking(AsyncClient.again)

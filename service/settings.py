@@ -170,6 +170,10 @@ class Settings(BaseSettings):
         [sys.executable, "-P", "-m", "worker.programs.clicked_pose"],
         description="Program of the API that finds a first pose while points are clicked.",
     )
+    plan_program: list[str] = Field(
+        [sys.executable, "-P", "-m", "worker.programs.plan"],
+        description="Program of the API that plans cameras.",
+    )
 
     # Pictures and stitched views.
     picture_program: list[str] = Field(

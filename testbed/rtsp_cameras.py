@@ -88,10 +88,14 @@ class Camera(GstRtspServer.RTSPMediaFactory):
         if self._is_frozen:
             picture = max((whole for whole in film.whole if whole <= picture), default=film.whole[-1])
         self._next = picture if self._is_frozen else picture + 1
+        taken, at_ns = Gst.Buffer.new_wrapped(film.pictures[picture]), time.time_ns()
+        # Not when GStreamer comes to it: on a busy machine that is later. Before it plays, it has no clock.
+        if (clock := source.get_clock()) is not None:
+            taken.pts = taken.dts = clock.get_time() - source.get_base_time()
         # At once: the first picture of a camera is taken in a thread of its own.
-        sys.stdout.write(f"{self._number} {number} {time.time_ns()} {picture} {film.path}\n")
+        sys.stdout.write(f"{self._number} {number} {at_ns} {picture} {film.path}\n")
         sys.stdout.flush()
-        return source.emit("push-buffer", Gst.Buffer.new_wrapped(film.pictures[picture])) == Gst.FlowReturn.OK
+        return source.emit("push-buffer", taken) == Gst.FlowReturn.OK
 
     def _tell_time(self, media: GstRtspServer.RTSPMedia) -> None:
         """Send RTCP reports with the time that this camera's clock has."""

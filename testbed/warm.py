@@ -58,6 +58,7 @@ IMPORTED = (
 PROGRAMS = (
     "worker.programs.clicked_pose",
     "worker.programs.draw",
+    "worker.programs.plan",
     "worker.programs.snapshot",
     "worker.programs.stitch",
     "worker.programs.stmap",

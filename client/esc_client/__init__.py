@@ -21,6 +21,7 @@ from service.schemas.history import Revision
 from service.schemas.job import Job, JobEvent, Progress
 from service.schemas.live import LiveHistory, LiveReport, LiveState
 from service.schemas.options import Options
+from service.schemas.plan import PlanAnswer, PlannedCameraIn, PlannedSite
 from service.schemas.results import CameraResult, FindResult, Result
 from service.schemas.schedule import Schedule
 from service.schemas.trend import Trend
@@ -49,6 +50,9 @@ __all__ = [
     "LiveState",
     "NotUnderstood",
     "Options",
+    "PlanAnswer",
+    "PlannedCameraIn",
+    "PlannedSite",
     "Pose",
     "PoseIn",
     "PosesEvent",

@@ -11,6 +11,7 @@ from service.api.change_watch import FILE_INTERVAL_S, INTERVAL_S, ChangeWatch, C
 from service.api.programs.camera_views import CameraViews
 from service.api.programs.clicked_pose import ClickedPoses
 from service.api.programs.drawings import Drawings
+from service.api.programs.plans import Plans
 from service.api.programs.stitches import Stitches
 from service.api.shared_reads import SharedReads
 from service.api.uploads import Uploads
@@ -50,6 +51,7 @@ class Context(ApplicationState):
         self.uploads = Uploads(settings)
         self.clicked_poses = ClickedPoses(settings)
         self.drawings = Drawings(settings, self.jobs, self.blobs)
+        self.plans = Plans(settings)
         self.stitches = Stitches(settings)
         self.camera_views = CameraViews(self.snapshots)
 

@@ -52,8 +52,9 @@ def plan(
 
     solution = planning.solve(place, lines, hidden)
     output.mkdir(parents=True, exist_ok=True)
-    for name, picture in solution.pictures.items():
-        (output / name).write_bytes(picture)
+    pictures = planning.draw_field_maps(solution.plan) | planning.draw_camera_maps(solution.plan)
+    for name, picture in pictures.items():
+        (output / f"{name}.png").write_bytes(picture)
     (output / "plan.json").write_text(solution.result.model_dump_json(indent=2) + "\n")
     (output / "maps.json").write_text(solution.maps.model_dump_json() + "\n")
     sought = place.to_sought(solution.result)

@@ -1,4 +1,4 @@
-"""Pages for a new venue: from frames alone, or from pitch, lenses and clicked first poses."""
+"""Pages for a new venue: a plan of its cameras, from frames alone, or from pitch, lenses and clicked first poses."""
 
 import math
 from typing import Annotated, Any, get_args
@@ -30,6 +30,12 @@ def new_venue(request: Request, context: InContext) -> Response:
 def by_hand(request: Request, context: InContext) -> Response:
     """Show the guided form; its data stay in the browser until the venue is created."""
     return _described(request, context, "venue_by_hand.html")
+
+
+@router.get("/ui/plan", openapi_extra=needs_scope("calibrate"))
+def planning(request: Request) -> Response:
+    """Show the form for a plan of cameras before they are mounted."""
+    return render_page(request, "planning.html", templates=NAMES)
 
 
 def _described(request: Request, context: Context, template: str) -> Response:

@@ -59,7 +59,6 @@ templates.globals |= {
     "version": version("esc-calibration"),
     "is_within_uncertainty": is_within_uncertainty,
     "seam_curve": seam_curve,
-    "trend_charts": trend_charts,
     "reasons": REFUSAL_REASONS,
     "alarm_words": formatting.ALARMS,
     "kind_words": formatting.KINDS,
@@ -80,6 +79,7 @@ templates.filters |= {
     "moment": formatting.moment,
     "seconds": formatting.seconds,
     "edition": part_version,
+    "trend_charts": trend_charts,
 }
 
 

@@ -188,7 +188,9 @@ def history(venue_id: VenueIdPath, context: InContext) -> dict[str, Any]:
         "stitch_error_px": [end.stitch_error_px for end in ends],
         "stitch_error_limit_px": next((end.stitch_error_limit_px for end in reversed(ends)), None),
         "moved_px": {
-            camera: [end.moved[camera].pixels if camera in end.moved else None for end in ends] for camera in cameras
+            # No shift at all: no pose was found.
+            camera: [end.moved[camera].pixels or None if camera in end.moved else None for end in ends]
+            for camera in cameras
         },
     }
 

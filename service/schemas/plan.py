@@ -1,11 +1,12 @@
 """Models of a plan: cameras that are not mounted yet, and what a calibration would make of them."""
 
+from math import atan, degrees
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, StringConstraints, model_validator
 
 from service.schemas.addresses import SourceUrl
-from service.schemas.base import Id, Integer, Number, Schema
+from service.schemas.base import OPEN_WORD, Id, Integer, Number, Schema
 from service.schemas.field import PitchPoint
 from service.schemas.find import SoughtCameraIn, SoughtSite
 from service.schemas.geometry import Intrinsics, Light, PoseIn, Position, Side, check_lens, require_camera_id
@@ -13,6 +14,10 @@ from service.schemas.results import Sigma
 from service.schemas.venue import Ignore, VenueSettings, require_distinct_ids
 
 LineStateName = Literal["fresh", "worn", "night"]
+HiddenShare = Annotated[float, Field(ge=0, le=0.9, allow_inf_nan=False)]
+PlanPicture = Literal["place", "pixels-per-metre", "coverage"]
+# Of lenses without distortion.
+NARROWEST_DEG, WIDEST_DEG = 2.0, 150.0
 Angle = Annotated[Number, Field(ge=-360, le=360)]
 Millimetres = Annotated[Number, Field(gt=0, le=10_000)]
 
@@ -24,7 +29,7 @@ class PlannedCameraIn(Schema):
     `field_of_view_deg`, `focal_length_mm` with `sensor_width_mm`, or `intrinsics`.
     """
 
-    id: Id
+    id: Id = Field(description="Id of the camera.")
     image_size: Annotated[list[Side], Field(min_length=2, max_length=2)] = Field(description="Width, height in pixels.")
     position: Position | None = Field(None, description="Place of the camera, m.", examples=[[-1.0, -48.0, 12.0]])
     look_at: PitchPoint | None = Field(
@@ -35,11 +40,11 @@ class PlannedCameraIn(Schema):
     roll_deg: Angle = Field(0.0, description="Roll, clockwise seen from behind the camera.")
     pose: PoseIn | None = Field(None, description="Pose of a camera that stands already.")
     intrinsics: Intrinsics | None = Field(None, description="Lens that was calibrated already.")
-    field_of_view_deg: Annotated[Number, Field(ge=2, le=150)] | None = Field(
+    field_of_view_deg: Annotated[Number, Field(ge=NARROWEST_DEG, le=WIDEST_DEG)] | None = Field(
         None, description="Horizontal field of view of a lens without distortion."
     )
-    focal_length_mm: Millimetres | None = None
-    sensor_width_mm: Millimetres | None = None
+    focal_length_mm: Millimetres | None = Field(None, description="Focal length of a lens without distortion.")
+    sensor_width_mm: Millimetres | None = Field(None, description="Width of its sensor.")
     ignore: Ignore = Field([])
     light: Light | None = Field(None, description="Ignored: a venue is a valid plan.")
     source: SourceUrl | None = Field(None, description="Ignored: a venue is a valid plan.")
@@ -74,7 +79,20 @@ class PlannedCameraIn(Schema):
             )
         if self.intrinsics is not None:
             check_lens(self.intrinsics, self.image_size)
+        view_deg = self.pinhole_view_deg
+        if view_deg is not None and not NARROWEST_DEG <= view_deg <= WIDEST_DEG:
+            raise ValueError(
+                f"camera {self.id}: expected a field of view of {NARROWEST_DEG:g} to {WIDEST_DEG:g} degrees, "
+                f"focal_length_mm and sensor_width_mm make {view_deg:.4g}"
+            )
         return self
+
+    @property
+    def pinhole_view_deg(self) -> float | None:
+        """Horizontal field of view of a lens without distortion; None if `intrinsics` are the lens."""
+        if self.focal_length_mm is None or self.sensor_width_mm is None:
+            return self.field_of_view_deg
+        return 2 * degrees(atan(self.sensor_width_mm / 2 / self.focal_length_mm))
 
 
 class StandIn(Schema):
@@ -83,10 +101,10 @@ class StandIn(Schema):
     id: Annotated[str, StringConstraints(pattern=r"^[a-z0-9][a-z0-9_-]{0,60}$")] = Field(
         description="Its cameras are called `id-1`, `id-2` and so on, from left to right."
     )
-    position: Position
-    cameras: Annotated[Integer, Field(ge=1, le=8)]
+    position: Position = Field(description="Place of the stand, m.")
+    cameras: Annotated[Integer, Field(ge=1, le=8)] = Field(description="Number of its cameras.")
     image_size: Annotated[list[Side], Field(min_length=2, max_length=2)] = Field(description="Width, height in pixels.")
-    overlap_deg: Annotated[Number, Field(ge=0, le=30)] = 5.0
+    overlap_deg: Annotated[Number, Field(ge=0, le=30)] = Field(5.0, description="Common view of two neighbours.")
 
     @model_validator(mode="after")
     def _above_the_pitch(self) -> Self:
@@ -100,9 +118,13 @@ class StandIn(Schema):
 class PlannedSite(VenueSettings):
     """A field and the cameras that are to be mounted around it; a whole venue is one, too."""
 
-    id: Id = "plan"
-    cameras: Annotated[list[PlannedCameraIn], Field(max_length=32)] = Field([])
-    stands: Annotated[list[StandIn], Field(max_length=8)] = Field([])
+    id: Id = Field("plan", description="Id of the venue to come.")
+    cameras: Annotated[list[PlannedCameraIn], Field(max_length=32)] = Field(
+        [], description="Cameras that are to be mounted."
+    )
+    stands: Annotated[list[StandIn], Field(max_length=8)] = Field(
+        [], description="Places for cameras whose directions and lenses are to be proposed."
+    )
     warnings: list[str] = Field([], exclude=True, description="Ignored: a venue is a valid plan.")
 
     @model_validator(mode="after")
@@ -130,7 +152,7 @@ def _sought(planned: "PlannedCameraResult", given: PlannedCameraIn | None) -> So
         id=planned.id,
         image_size=planned.image_size,
         intrinsics=lens,
-        field_of_view_deg=None if lens is not None else max(planned.field_of_view_deg, 5.0),
+        field_of_view_deg=None if planned.field_of_view_deg is None or lens else max(planned.field_of_view_deg, 5.0),
         position=planned.position,
         # A mast that is put up beside its place.
         position_radius_m=3.0,
@@ -141,34 +163,36 @@ def _sought(planned: "PlannedCameraResult", given: PlannedCameraIn | None) -> So
 class Spread(Schema):
     """Values over the field in view: the `median`, and `worst`, which only 5 % of it exceed."""
 
-    median: float
-    worst: float
+    median: float = Field(description="Median over the field in view.")
+    worst: float = Field(description="The value that only 5 % of the field in view exceed.")
 
 
 class PlaceChange(Schema):
     """Sigma of places on the ground, m, before and after a change: rms over the field in view."""
 
-    before_m: float
-    after_m: float
+    before_m: float = Field(description="Before the change, m.")
+    after_m: float = Field(description="After the change, m.")
 
 
 class DecisiveMarkingResult(Schema):
     """A marking, its length that is measured, and the sigma of places on the ground without it."""
 
-    marking: str
-    measured_m: float
-    without: PlaceChange
+    marking: str = Field(description="Name of the marking.")
+    measured_m: float = Field(description="Length that is measured of it, m.")
+    without: PlaceChange = Field(description="Change of `calibration_m` without it.")
 
 
 class PlannedCameraResult(Schema):
     """Plan of a camera."""
 
-    id: Id
-    image_size: list[int]
+    id: Id = Field(description="Id of the camera.")
+    image_size: list[int] = Field(description="Width, height in pixels.")
     position: list[float] = Field(description="Place, m.")
-    pan_deg: float
-    tilt_deg: float
-    field_of_view_deg: float = Field(description="Horizontal field of view.")
+    pan_deg: float = Field(description="Pan: 0 looks along y, positive to the right.")
+    tilt_deg: float = Field(description="Tilt: negative looks down.")
+    field_of_view_deg: float | None = Field(
+        description="Horizontal field of view; null: the lens has no rays at the edges of its picture."
+    )
     calibratable: bool = Field(description="False if the quality gate would refuse its poses.")
     share_of_field: float = Field(description="Share of the field in view, 0..1.")
     sigma: Sigma = Field(description="Expected sigma of its pose, for the lens as given.")
@@ -190,8 +214,8 @@ class PlannedCameraResult(Schema):
 class PlannedPairResult(Schema):
     """Plan of two cameras that see some of the same ground."""
 
-    cameras: Annotated[list[Id], Field(min_length=2, max_length=2)]
-    overlap_m2: float
+    cameras: Annotated[list[Id], Field(min_length=2, max_length=2)] = Field(description="Ids of the two cameras.")
+    overlap_m2: float = Field(description="Ground of the field that both see, m².")
     stitch_m: float = Field(description="Expected distance between the places where they put the same ground, rms, m.")
     markings_m: dict[str, float] = Field(description="Length that both measure of each marking, m.")
     five_degrees_more_m: float | None = Field(
@@ -202,21 +226,21 @@ class PlannedPairResult(Schema):
 class PlanWarningResult(Schema):
     """Warning about a plan. `cameras`: empty if it is about the field."""
 
-    kind: str
-    cameras: list[Id]
-    detail: str
+    kind: str = Field(description="Kind of warning, a stable word.")
+    cameras: list[Id] = Field(description="Ids of the cameras that it is about.")
+    detail: str = Field(description="The warning in words, and what to do.")
 
 
 class PlanResult(Schema):
     """Expected calibration of planned cameras: sigmas, coverage, overlap, what decides them, and warnings."""
 
-    lines: LineStateName
-    hidden: float
+    lines: Annotated[LineStateName, OPEN_WORD] = Field(description="State of the lines that the plan is for.")
+    hidden: float = Field(description="Share of the lines that something covers, 0..1.")
     place_m: Spread | None = Field(description="Sigma of a player's place by the camera that knows it best.")
     covered: dict[int, float] = Field(description="Share of the field by the number of cameras that see it.")
-    cameras: list[PlannedCameraResult]
-    pairs: list[PlannedPairResult]
-    warnings: list[PlanWarningResult]
+    cameras: list[PlannedCameraResult] = Field(description="Each camera.")
+    pairs: list[PlannedPairResult] = Field(description="Each two cameras that see some of the same ground.")
+    warnings: list[PlanWarningResult] = Field(description="Faults of the plan.")
 
     @property
     def calibratable(self) -> bool:
@@ -230,18 +254,29 @@ Rows = list[list[float | None]]
 class CameraMaps(Schema):
     """Maps of one camera; null where it does not see the field."""
 
-    place_m: Rows
-    calibration_m: Rows
-    px_per_metre: Rows
-    px_per_metre_along: Rows
+    place_m: Rows = Field(description="Sigma of a player's place, m.")
+    calibration_m: Rows = Field(description="The part of it by pose, lens and field, m.")
+    px_per_metre: Rows = Field(description="Pixels per metre across the line of sight.")
+    px_per_metre_along: Rows = Field(description="Pixels per metre of ground along the line of sight.")
 
 
 class PlanMaps(Schema):
-    """Maps of a plan, row by row from the far touchline. `x_m`, `y_m`: centres of the columns and rows."""
+    """Maps of a plan, row by row from the far touchline."""
 
-    x_m: list[float]
-    y_m: list[float]
-    place_m: Rows = Field(description="By the camera that knows a place best.")
-    px_per_metre: Rows
+    x_m: list[float] = Field(description="Centres of the columns, m.")
+    y_m: list[float] = Field(description="Centres of the rows, m.")
+    place_m: Rows = Field(description="Sigma of a player's place by the camera that knows it best, m.")
+    px_per_metre: Rows = Field(description="Pixels per metre in the camera that resolves a place best.")
     coverage: list[list[int]] = Field(description="Number of cameras that see a cell.")
-    cameras: dict[Id, CameraMaps]
+    cameras: dict[Id, CameraMaps] = Field(description="Maps of each camera, by its id.")
+
+
+class PlanAnswer(Schema):
+    """Plan of a site, with its maps."""
+
+    plan: PlanResult = Field(description="Expected calibration.")
+    maps: PlanMaps = Field(description="Maps of the field in numbers.")
+    pictures: dict[str, str] = Field(
+        description="The field from above as PNG files in base64: `place` (sigma of a player's place), "
+        "`pixels-per-metre`, `coverage` (number of cameras)."
+    )

@@ -152,7 +152,7 @@ REFUSAL_REASONS: dict[str, RefusalReason] = {
     "no-markings-in-view": RefusalReason(
         "The stored pose sees no markings",
         "Nothing: the drawing lies outside the picture.",
-        "Put a first pose that looks at the field; PUT says which convention would explain the stored one.",
+        "Put a first pose that looks at the field; a venue's warnings say which convention explains the stored one.",
         "the-wrong-camera",
     ),
     "lines": RefusalReason(

@@ -35,6 +35,7 @@ def test_the_interface_is_the_contract(model):
         assert 0 <= probability.min() <= probability.max() <= 1
 
 
+@pytest.mark.long
 def test_it_finds_the_lines_of_a_pitch_it_has_not_seen_and_little_else(model):
     field = Field(100.0, 64.0, 0.12, np.array([[-15.0, 0.0, 0.3], [15.0, 0.0, 0.3]]))
     lens = Intrinsics(

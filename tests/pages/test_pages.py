@@ -287,6 +287,7 @@ PAGES = {
     "no-jobs": "/ui/jobs?venue=none",
     "job": "/ui/jobs/{job}",
     "failed-job": "/ui/jobs/{failed}",
+    "plan": "/ui/plan",
     "new-venue": "/ui/new-venue",
     "new-venue-by-hand": "/ui/new-venue/by-hand",
     "find": "/ui/venues/years/find",
@@ -296,7 +297,7 @@ PAGES = {
 }
 
 
-@pytest.mark.parametrize("name", try_first(PAGES, 5))
+@pytest.mark.parametrize("name", try_first(PAGES, 3))
 def test_nothing_serious_keeps_anybody_from_using_a_page_and_it_fits_a_phone(stub, years, ended, one_tab, name):
     stub.venue("bare")
     one_tab.set_viewport_size(DESK)
@@ -304,7 +305,8 @@ def test_nothing_serious_keeps_anybody_from_using_a_page_and_it_fits_a_phone(stu
     one_tab.wait_for_load_state("networkidle")
     assert grave(one_tab) == []
     one_tab.set_viewport_size(PHONE)
-    assert one_tab.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
+    # Charts follow the width of the page a moment later.
+    wait_until(one_tab, f"document.documentElement.scrollWidth <= {PHONE['width']}")
 
 
 def test_the_keyboard_reaches_what_a_page_offers(stub, ended, visit):

@@ -2,6 +2,7 @@
 
 import asyncio
 import re
+from functools import cache
 
 import httpx
 
@@ -11,6 +12,7 @@ from service.schemas.problems import MEDIA_TYPE
 from service.settings import Settings
 from testbed import program
 from testbed.running import Service
+from tools.openapi import document
 from worker.job_files import JobFiles
 from worker.protocol import Message
 from worker.result_checks import fault_in
@@ -34,28 +36,29 @@ class ApplicationTransport(httpx.BaseTransport):
         self._loop.close()
 
 
-class ListedProblems:
-    """Fails for a problem that the OpenAPI document does not list for the route that answers it."""
+@cache
+def documented_routes() -> dict[tuple[str, str], dict]:
+    """Return the responses of each route by its method and a pattern of its path, whatever the settings."""
+    return {
+        (method.upper(), re.sub(r"\\{\w+\\}", "[^/]+", re.escape(path))): operation["responses"]
+        for path, operations in document()["paths"].items()
+        for method, operation in operations.items()
+    }
 
-    def __init__(self, app) -> None:
-        self._routes = {
-            (method.upper(), re.sub(r"\\{\w+\\}", "[^/]+", re.escape(path))): operation["responses"]
-            for path, operations in app.openapi()["paths"].items()
-            for method, operation in operations.items()
-        }
 
-    def check(self, answer: httpx.Response) -> None:
-        if answer.headers.get("content-type") != MEDIA_TYPE or answer.request.method == "HEAD":
-            return
-        answer.read()
-        kind, status = answer.json()["type"], str(answer.status_code)
-        # A fault of the service can be anywhere.
-        if kind == "/problems/internal-error":
-            return
-        for (method, path), responses in self._routes.items():
-            if method == answer.request.method and re.fullmatch(path, answer.request.url.path):
-                listed = responses.get(status, {}).get("x-problem-types", [])
-                assert kind in listed, f"{method} {answer.request.url.path} answers {status} {kind}, not in {listed}"
+def check_problem_is_documented(answer: httpx.Response) -> None:
+    """Fail for a problem that the OpenAPI document does not list for the route that answers it."""
+    if answer.headers.get("content-type") != MEDIA_TYPE or answer.request.method == "HEAD":
+        return
+    answer.read()
+    kind, status = answer.json()["type"], str(answer.status_code)
+    # A fault of the service can be anywhere.
+    if kind == "/problems/internal-error":
+        return
+    for (method, path), responses in documented_routes().items():
+        if method == answer.request.method and re.fullmatch(path, answer.request.url.path):
+            listed = responses.get(status, {}).get("x-problem-types", [])
+            assert kind in listed, f"{method} {answer.request.url.path} answers {status} {kind}, not in {listed}"
 
 
 class LocalService(Service):
@@ -67,10 +70,8 @@ class LocalService(Service):
         app = create_app(settings)
         self.context = app.state.context
         self.url = "http://localhost"
-        listed = ListedProblems(app)
-        self.http = httpx.Client(
-            base_url=self.url, transport=ApplicationTransport(app), event_hooks={"response": [listed.check]}
-        )
+        check = {"response": [check_problem_is_documented]}
+        self.http = httpx.Client(base_url=self.url, transport=ApplicationTransport(app), event_hooks=check)
         self.ask = self.http.request
 
     def __enter__(self) -> "LocalService":

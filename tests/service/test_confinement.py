@@ -16,6 +16,7 @@ DECODERS = {
     "worker.jobs.program": [],
     "worker.programs.clicked_pose": [],
     "worker.programs.draw": [],
+    "worker.programs.plan": [],
     "worker.programs.snapshot": [],
     "worker.programs.stitch": [],
     "worker.programs.stmap": ["top-left"],

@@ -5,7 +5,9 @@ from collections import Counter
 import pytest
 import sqlalchemy as sa
 
+from service.schemas.geometry import Moved
 from testbed.homes import in_both_homes
+from testbed.stock import result
 from tests.service.local_service import LocalService
 
 
@@ -13,6 +15,18 @@ from tests.service.local_service import LocalService
 def service(stock):
     with LocalService(stock.settings) as service:
         yield service
+
+
+def test_a_camera_whose_pose_was_not_found_has_not_moved_by_nothing(stock, service):
+    task = stock.attempts.begin(stock.submitted("v"))
+    refused = result(task.venue, accepted=False)
+    stays = Moved(rotation_deg=0, position_m=0, pixels=0)
+    cameras = [camera.model_copy(update={"moved": stays}) for camera in refused.cameras]
+    stock.attempts.finish(task, refused.model_copy(update={"cameras": cameras}), [])
+    page = service.ask("GET", "/ui/venues/v").text
+    assert page.count("no pose was found") == 2
+    assert "0.00 px</dd>" not in page
+    assert service.ask("GET", "/ui/venues/v/history.json").json()["moved_px"] == {"left": [None], "right": [None]}
 
 
 @in_both_homes

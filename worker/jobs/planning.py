@@ -1,8 +1,8 @@
 """Plans of installations: from a site with cameras that are not mounted yet to sigmas, maps and warnings."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from math import atan, degrees
+from math import isfinite
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from service.schemas.plan import (
     PlannedCameraResult,
     PlannedPairResult,
     PlannedSite,
+    PlanPicture,
     PlanResult,
     PlanWarningResult,
     Rows,
@@ -46,7 +47,7 @@ from worker.calibration.planning.variations import (
 )
 from worker.calibration.planning.warnings import REFUSED, PlanWarning, find_warnings
 from worker.calibration.refinement.uncertainty import Sigma
-from worker.calibration.rendering.plan_maps import COVERAGE, PLACE, RESOLUTION, plan_map
+from worker.calibration.rendering.plan_maps import COVERAGE, PLACE, RESOLUTION, Scale, plan_map
 from worker.jobs.from_schemas import encode_png, ignored_areas_of, lens_of, pitch_of
 
 WORST = 0.95
@@ -55,11 +56,11 @@ WORST = 0.95
 
 @dataclass(frozen=True)
 class PlanSolution:
-    """A plan as an answer: the `result`, its `maps` in numbers, and `pictures` (PNG files) by their names."""
+    """A plan, and as an answer: its `result` and its `maps` in numbers."""
 
+    plan: Plan
     result: PlanResult
     maps: PlanMaps
-    pictures: Mapping[str, bytes]
 
 
 def solve(site: PlannedSite, state: LineStateName, hidden: float) -> PlanSolution:
@@ -77,7 +78,27 @@ def solve(site: PlannedSite, state: LineStateName, hidden: float) -> PlanSolutio
         pairs=[_pair_result(planned, pair) for pair in planned.pairs],
         warnings=[PlanWarningResult(kind=one.kind, cameras=list(one.cameras), detail=one.words) for one in warnings],
     )
-    return PlanSolution(result, _maps(planned), _pictures(planned))
+    return PlanSolution(planned, result, _maps(planned))
+
+
+def draw_field_maps(planned: Plan) -> dict[PlanPicture, bytes]:
+    """Draw the maps of all cameras together, PNG files by their names."""
+    cameras = [one.camera for one in planned.cameras]
+    coverage = np.where(planned.coverage > 0, planned.coverage.astype(float), np.nan)
+    maps: dict[PlanPicture, tuple[Array, Scale]] = {
+        "place": (planned.place_m, PLACE),
+        "pixels-per-metre": (planned.px_per_metre, RESOLUTION),
+        "coverage": (coverage, COVERAGE),
+    }
+    return {name: encode_png(plan_map(planned.pitch, values, cameras, scale)) for name, (values, scale) in maps.items()}
+
+
+def draw_camera_maps(planned: Plan) -> dict[str, bytes]:
+    """Draw the sigma of a player's place by each camera alone, PNG files by their names."""
+    return {
+        f"place-{one.camera.id}": encode_png(plan_map(planned.pitch, one.place_m, [one.camera], PLACE))
+        for one in planned.cameras
+    }
 
 
 def _cameras(pitch: Field, site: PlannedSite) -> list[Camera]:
@@ -102,11 +123,8 @@ def _lens(given: PlannedCameraIn) -> Lens:
     if given.intrinsics is not None:
         return lens_of(given.intrinsics, given.image_size)
     width, height = given.image_size
-    if given.field_of_view_deg is not None:
-        return pinhole((width, height), given.field_of_view_deg)
-    assert given.focal_length_mm is not None
-    assert given.sensor_width_mm is not None
-    return pinhole((width, height), 2 * degrees(atan(given.sensor_width_mm / 2 / given.focal_length_mm)))
+    assert given.pinhole_view_deg is not None
+    return pinhole((width, height), given.pinhole_view_deg)
 
 
 def _pose(pitch: Field, given: PlannedCameraIn) -> Pose:
@@ -132,12 +150,13 @@ def _camera_result(
     one = planned.cameras[number]
     refused = any(one.camera.id in warning.cameras and warning.kind in REFUSED for warning in warnings)
     pan_deg, tilt_deg = pan_tilt_deg(one.camera.pose)
+    view_deg = field_of_view_deg(one.camera)
     return PlannedCameraResult(
         id=one.camera.id,
         position=one.camera.pose.position.round(3).tolist(),
         pan_deg=round(pan_deg, 2),
         tilt_deg=round(tilt_deg, 2),
-        field_of_view_deg=round(field_of_view_deg(one.camera), 2),
+        field_of_view_deg=round(view_deg, 2) if isfinite(view_deg) else None,
         image_size=list(one.camera.intrinsics.size),
         calibratable=not refused,
         share_of_field=round(one.share, 4),
@@ -148,14 +167,16 @@ def _camera_result(
         calibration_m=_spread(one.calibrated_m, WORST),
         px_per_metre=_spread(one.px_per_metre, 1 - WORST),
         px_per_metre_along=_spread(one.px_per_metre_along, 1 - WORST),
-        decisive_markings=[_decisive(planned, one, marking) for marking in decisive],
+        decisive_markings=[result for marking in decisive if (result := _decisive(planned, one, marking))],
         one_metre_higher=_change(higher(planned, number)),
     )
 
 
-def _decisive(planned: Plan, one: CameraPlan, marking: DecisiveMarking) -> DecisiveMarkingResult:
+def _decisive(planned: Plan, one: CameraPlan, marking: DecisiveMarking) -> DecisiveMarkingResult | None:
     change = _change(marking.without)
-    assert change is not None
+    if change is None:
+        # No cell of the map is in view.
+        return None
     return DecisiveMarkingResult(
         marking=marking.name, measured_m=_metres_by_name(planned.pitch, one.line_m)[marking.name], without=change
     )
@@ -220,17 +241,3 @@ def _maps(planned: Plan) -> PlanMaps:
 
 def _rows(values: Array) -> Rows:
     return [[None if np.isnan(value) else round(value, 4) for value in row] for row in values.tolist()]
-
-
-def _pictures(planned: Plan) -> dict[str, bytes]:
-    cameras = [one.camera for one in planned.cameras]
-    coverage = np.where(planned.coverage > 0, planned.coverage.astype(float), np.nan)
-    drawn = {
-        "place": plan_map(planned.pitch, planned.place_m, cameras, PLACE),
-        "pixels-per-metre": plan_map(planned.pitch, planned.px_per_metre, cameras, RESOLUTION),
-        "coverage": plan_map(planned.pitch, coverage, cameras, COVERAGE),
-    }
-    drawn |= {
-        f"place-{one.camera.id}": plan_map(planned.pitch, one.place_m, [one.camera], PLACE) for one in planned.cameras
-    }
-    return {f"{name}.png": encode_png(picture) for name, picture in drawn.items()}

@@ -98,7 +98,7 @@ def _frame_of_stream(relay: Relay, task: SourceTask) -> bytes:
     os.environ["OPENCV_FFMPEG_CAPTURE_OPTIONS"] = "|".join(";".join(option) for option in FFMPEG_OPTIONS.items())
     import cv2
 
-    limit_ms = int(task.seconds * 1000)
+    begun, limit_ms = time.monotonic(), int(task.seconds * 1000)
     stream = cv2.VideoCapture(
         relay.url,
         cv2.CAP_FFMPEG,
@@ -106,7 +106,7 @@ def _frame_of_stream(relay: Relay, task: SourceTask) -> bytes:
     )
     try:
         if not stream.isOpened():
-            raise CameraError(relay.why or "no stream could be opened; try the address with any player of RTSP")
+            raise _failure(relay, task, begun, "no stream could be opened; try the address with any player of RTSP")
         width, height = (int(stream.get(p)) for p in (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT))
         if width * height > task.most_pixels:
             raise CameraError(
@@ -115,11 +115,20 @@ def _frame_of_stream(relay: Relay, task: SourceTask) -> bytes:
         _pass_by_first_frames(stream)
         whole, frame = stream.read()
         if not whole:
-            raise CameraError(relay.why or "the stream ended before a whole frame came")
+            raise _failure(relay, task, begun, "the stream ended before a whole frame came")
     finally:
         stream.release()
     _, data = cv2.imencode(".jpg", frame, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
     return data.tobytes()
+
+
+def _failure(relay: Relay, task: SourceTask, begun: float, otherwise: str) -> CameraError:
+    """Return why a stream gave no frame: what the camera said, that its time is over, or else `otherwise`.
+
+    OpenCV does not tell a stream that it gave up from one that failed.
+    """
+    is_late = time.monotonic() - begun >= task.seconds
+    return CameraError(relay.why or (f"it gave no frame within {task.seconds:g} s" if is_late else otherwise))
 
 
 def _pass_by_first_frames(stream: "cv2.VideoCapture") -> None:

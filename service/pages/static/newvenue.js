@@ -12,7 +12,12 @@ const button = document.getElementById("find");
 const missing = document.getElementById("missing");
 const refused = document.getElementById("refused");
 const most = Number(box.dataset.bytes);
+// A mast that is put up beside its place.
+const PLANNED_RADIUS_M = 3;
+const NARROWEST_DEG = 5;
 const cameras = [];
+/** Cameras of the plan that this page was opened with, by their ids. */
+const planned = new Map();
 
 /** An unused camera id after the name of a file. */
 function idOf(file) {
@@ -42,11 +47,12 @@ class Camera {
 
   get id() { return this.field("camera").value; }
 
-  /** The camera for the interface; unset hints are left out. */
+  /** The camera for the interface; unset hints are left out, and a camera of the plan is looked for where that puts it. */
   get wire() {
-    const view = number(this.field("view").value);
+    const plan = planned.get(this.id);
+    const view = number(this.field("view").value) ?? plan?.view;
     const side = this.field("side").value;
-    return {id: this.id, ...(side ? {side} : {}), ...(view === undefined ? {} : {field_of_view_deg: view})};
+    return {id: this.id, ...(plan ? {position: plan.position, position_radius_m: PLANNED_RADIUS_M} : {}), ...(side ? {side} : {}), ...(view === undefined ? {} : {field_of_view_deg: view})};
   }
 }
 
@@ -70,6 +76,7 @@ async function add(files) {
 /** Returns the steps that are still missing. */
 function tell() {
   const open = missingOfPitch();
+  for (const camera of cameras) camera.field("view").placeholder = planned.get(camera.id)?.view ?? "not known";
   if (!cameras.length) open.push("a frame");
   if (cameras.some((camera) => !camera.id || !camera.field("camera").checkValidity())) open.push("an id of each camera");
   if (new Set(cameras.map((camera) => camera.id)).size < cameras.length) open.push("cameras of different names");
@@ -102,6 +109,17 @@ function upload(id) {
   return body;
 }
 
+/** Begin with the pitch and the cameras of a plan. */
+function takePlan() {
+  const kept = location.hash === "#planned" && sessionStorage.getItem("plan");
+  if (!kept) return;
+  const plan = JSON.parse(kept);
+  for (const [name, value] of Object.entries(plan.pitch)) pitchForm.elements[name].value = value;
+  for (const {id, position, view} of plan.cameras) planned.set(id, {position, view: Math.max(NARROWEST_DEG, view)});
+  document.getElementById("planned-ids").textContent = [...planned.keys()].join(", ");
+  document.getElementById("from-plan").hidden = false;
+}
+
 /** Take the files that the input has by now: on a slow connection they are chosen before this script is loaded. */
 function take() {
   if (input.files.length === 0) return;
@@ -110,6 +128,7 @@ function take() {
 }
 
 input.addEventListener("change", take);
+takePlan();
 take();
 document.addEventListener("dragover", (event) => event.preventDefault());
 document.addEventListener("drop", (event) => {

@@ -55,7 +55,7 @@ export function missingOfPitch() {
   const open = [];
   const {id} = pitchForm.elements;
   if (pitch.isTaken) open.push("an id that no other venue has");
-  if (!id.value || !id.checkValidity()) open.push("an id of small letters, digits, - and _");
+  if (id && (!id.value || !id.checkValidity())) open.push("an id of small letters, digits, - and _");
   if (!pitch.plan) open.push("a pitch");
   return open;
 }
@@ -63,7 +63,7 @@ export function missingOfPitch() {
 /** Call `changed()` after each change of the form, and once at the beginning. */
 export function readForm(changed) {
   pitchForm.addEventListener("input", later(() => readPitch(changed)));
-  pitchForm.elements.id.addEventListener("input", later(() => readId(changed).catch(() => {})));
+  pitchForm.elements.id?.addEventListener("input", later(() => readId(changed).catch(() => {})));
   pitchForm.addEventListener("submit", (event) => event.preventDefault());
   readPitch(changed);
 }

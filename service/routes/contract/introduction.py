@@ -9,7 +9,7 @@ right as seen from the cameras' usual side, where y < 0. y runs across the field
 **Cameras** are OpenCV's: x right, y down, z forward, pixel centres at integers. `rotation` is a Rodrigues vector (rad)
 from world to camera, `position` the camera's centre in the world, `translation` = -R·position is OpenCV's `tvec`.
 
-**Order of steps:**
+**Order of steps:** (before cameras are mounted, `POST /plan` says how exactly they will be calibrated)
 
 1. `POST /venues/{venue_id}/find`: a frame per camera and the name of the sport. The job finds lenses and first poses;
    `POST /venues/{venue_id}/adopt-found` makes them a venue, `POST /jobs/{job_id}/calibrate` calibrates that at once.

@@ -16,7 +16,7 @@ import pytest
 
 from testbed.running import Service, png, wait_for
 
-STALL_S, WHOLE_S = 1, 3
+STALL_S, WHOLE_S = 1, 2
 # Connections are looked at once a second, and a test machine is busy.
 SLACK_S = 10
 FORM = "Content-Type: multipart/form-data; boundary=x\r\n"

@@ -22,6 +22,7 @@ from service.schemas.events.venue_event import VenueChange, VenueEvent
 from service.schemas.field import FieldOfPlay
 from service.schemas.find import SoughtCameraIn, SoughtSite
 from service.schemas.health import AlarmEvent, VenueAlarm
+from service.schemas.plan import PlannedSite
 from service.schemas.results import FindResult
 from service.schemas.venue import VenueIn
 from testbed.running import DEADLINE_S, png, venue, wait_for
@@ -82,6 +83,15 @@ def test_the_calibration_of_a_tool_is_checked(service, frames, tmp_path):
     assert (job.result.format, job.result.grade) == ("pose2sim", "good")
 
 
+def test_cameras_are_planned_before_there_is_a_venue(service):
+    stand = {"id": "mast", "position": [0.0, -12.0, 5.0], "cameras": 2, "image_size": [1920, 1080]}
+    site = PlannedSite.model_validate({"field": {"template": "volleyball"}, "stands": [stand]})
+    with Client(service.url) as client:
+        made = client.plan(site, "worn", 0.1)
+    assert [camera.id for camera in made.plan.cameras] == ["mast-1", "mast-2"]
+    assert (made.plan.lines, made.plan.hidden) == ("worn", 0.1)
+
+
 def test_the_same_without_blocking(service, frames, name):
     async def life():
         async with AsyncClient(service.url) as client:
@@ -100,7 +110,7 @@ def test_the_same_without_blocking(service, frames, name):
 def test_both_clients_have_the_same_methods_with_the_same_signatures():
     clients = Client("http://127.0.0.1:9"), AsyncClient("http://127.0.0.1:9")
     names = [name for name in dir(Client) if not name.startswith("_") and name != "url_of"]
-    assert len(names) == 35
+    assert len(names) == 37
     for name in names:
         blocking, awaited = (getattr(client, name) for client in clients)
         assert inspect.signature(blocking) == inspect.signature(awaited)

@@ -17,7 +17,7 @@ from testbed.running import venue, wait_for
 from testbed.synthetic import CROWNED, pair, pair_frames
 from testbed.venue_documents import venue_document
 from tests.service.live.receiving import freed_packet, listening, opentrackio_sample, port_of
-from tests.worker.video.shaking import film_shaking
+from tests.worker.video.shaking import film_left
 
 FRAMES_PER_SECOND = 5
 
@@ -97,7 +97,7 @@ def test_a_command_whose_output_nobody_reads_any_more_ends_in_silence(arguments)
 
 @pytest.mark.slow
 def test_a_camera_is_tracked_in_its_stream_and_of_the_other_one_the_stored_pose_is_sent(service, name, tmp_path):
-    clip = film_shaking(tmp_path)["left"]
+    clip = film_left(tmp_path)
     service.http.put(f"/venues/{name}", json=venue_document(name, CROWNED, pair())).raise_for_status()
     with live(service, name, f"left={clip}", "--json", "--rate", "5") as process:
         lines = (json.loads(line) for line in process.stdout)

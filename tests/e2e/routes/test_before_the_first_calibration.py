@@ -27,10 +27,10 @@ def service(service_with_engine):
     return service_with_engine
 
 
-@pytest.fixture(scope="module")
-def photos():
+def photos(count):
+    """So many photos of a board and one of none, encoded."""
     seen = [place for place in places(20) if corners_seen(PINHOLE, *place)]
-    files = {f"board {number}.jpg": photograph(BOARD, *place) for number, place in enumerate(seen[:6])}
+    files = {f"board {number}.jpg": photograph(BOARD, *place) for number, place in enumerate(seen[:count])}
     files["empty.png"] = np.full((960, 1280), 90, np.uint8)
     return {name: cv2.imencode(name[-4:], photo)[1].tobytes() for name, photo in files.items()}
 
@@ -43,8 +43,8 @@ BOARD_OPTIONS = {"columns": 9, "rows": 6, "square_m": 0.03}
 
 
 @pytest.mark.long
-def test_photos_of_a_board_become_a_lens(service, photos):
-    answer = service.http.post("/intrinsics", files=parts(photos, board=BOARD_OPTIONS))
+def test_photos_of_a_board_become_a_lens(service):
+    answer = service.http.post("/intrinsics", files=parts(photos(count=6), board=BOARD_OPTIONS))
     job = answer.json()
     assert (answer.status_code, job["kind"], job["venue"]) == (202, "intrinsics", None)
     job = service.end(job["id"])
@@ -62,8 +62,8 @@ def test_photos_of_a_board_become_a_lens(service, photos):
     assert job["id"] in [one["id"] for one in service.http.get("/jobs").json()["jobs"]]
 
 
-def test_the_same_key_and_photos_are_the_same_job(service, photos):
-    two = dict(list(photos.items())[:2])
+def test_the_same_key_and_photos_are_the_same_job(service):
+    two = photos(count=1)
     key = {"Idempotency-Key": "lens-1"}
     first, again, other = (
         service.http.post("/intrinsics", files=parts(two, board=BOARD_OPTIONS | {"rows": rows}), headers=key)
@@ -76,19 +76,21 @@ def test_the_same_key_and_photos_are_the_same_job(service, photos):
     assert "take 15 or more" in ended["error"]["detail"]
 
 
-def test_photos_that_cannot_be_used_are_refused_by_name(service, photos):
+def test_photos_that_cannot_be_used_are_refused_by_name(service):
+    some = photos(count=1)
+
     def refused(files, **options):
         answer = service.http.post("/intrinsics", files=parts(files, **options))
         assert answer.headers["content-type"] == "application/problem+json"
         return answer.status_code, answer.json()["type"].rpartition("/")[2], answer.json()
 
-    (name, data), *_ = photos.items()
+    (name, data), *_ = some.items()
     assert refused({}, board=BOARD_OPTIONS)[:2] == (422, "missing-photos")
     assert refused({str(n): data for n in range(9)}, board=BOARD_OPTIONS)[:2] == (422, "too-many-photos")
     status, kind, problem = refused({name: data[:2000]}, board=BOARD_OPTIONS)
     assert (status, kind, problem["photo"]) == (422, "truncated-image", name)
-    assert refused(photos)[:2] == (422, "invalid-request")
-    assert refused(photos, board=BOARD_OPTIONS, colour="red")[:2] == (422, "invalid-request")
+    assert refused(some)[:2] == (422, "invalid-request")
+    assert refused(some, board=BOARD_OPTIONS, colour="red")[:2] == (422, "invalid-request")
     assert service.http.post("/intrinsics", json={}).status_code == 415
 
 
@@ -173,15 +175,17 @@ def test_what_is_wrong_with_a_request_is_said_at_once(service, name):
 
 
 @pytest.mark.long
-def test_esc_goes_from_photos_and_clicks_to_a_venue(tmp_path, photos):
+def test_esc_goes_from_photos_and_clicks_to_a_venue(tmp_path):
+    board = photos(count=6)
+
     def esc(*arguments):
         command = [sys.executable, "-m", "service.cli", *arguments]
         return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=200)
 
-    for name, data in photos.items():
+    for name, data in board.items():
         (tmp_path / name).write_bytes(data)
     found = esc(
-        "intrinsics", *photos, "--board", "9x6", "--square", "0.03", "-o", "lens.json", "--picture", "coverage.jpg"
+        "intrinsics", *board, "--board", "9x6", "--square", "0.03", "-o", "lens.json", "--picture", "coverage.jpg"
     )
     assert found.returncode == 0, found.stderr
     assert "empty.png shows no board" in found.stderr
@@ -190,7 +194,7 @@ def test_esc_goes_from_photos_and_clicks_to_a_venue(tmp_path, photos):
     )
     assert json.loads((tmp_path / "lens.json").read_text())["intrinsics"]["sigma"]["fx"] > 0
     assert (tmp_path / "coverage.jpg").read_bytes().startswith(b"\xff\xd8")
-    assert esc("intrinsics", *photos, "--board", "9", "--square", "0.03", "-o", "x.json").returncode == 2
+    assert esc("intrinsics", *board, "--board", "9", "--square", "0.03", "-o", "x.json").returncode == 2
 
     whole = venue("v")
     whole["cameras"][0]["intrinsics"]["sigma"] = {"fx": 2.0}

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from testbed.rendered_pair import PITCH, SIZE, cameras, encoded, frames, venue
+from testbed.rendered_pair import PITCH, SIZE, cameras, frames, venue
 from testbed.running import Service
 from worker.calibration.geometry.rotation import rotation_angles_deg
 
@@ -46,14 +46,6 @@ def test_outdated_poses_are_found_again_and_stored(service, name):
 
 
 @pytest.mark.long
-def test_a_black_frame_is_rejected_by_the_name_of_its_camera_and_the_stored_pose_stays(service, name):
-    dark = {**frames(), "right": encoded(np.zeros((SIZE[1], SIZE[0], 3), np.uint8))}
-    result = calibrated(service, venue(name), dark)["result"]
-    assert result["rejected_because"].startswith("camera right: ")
-    assert stored_position(service, name, 1) == venue(name)["cameras"][1]["pose"]["position"]
-
-
-@pytest.mark.long
 def test_a_camera_that_looks_elsewhere_than_it_is_stored_is_found_by_its_frame_and_taken(service, name):
     stored = venue(name, right_turn=np.array([1.2, 0.0, 0.0]))
     service.http.put(f"/venues/{name}", json=stored).raise_for_status()
@@ -73,18 +65,6 @@ def test_a_camera_that_looks_elsewhere_than_it_is_stored_is_found_by_its_frame_a
     assert rotation_angles_deg(right["pose"]["rotation"], truth.rotation) < 0.2
     assert right["intrinsics"]["matrix"] == stored["cameras"][1]["intrinsics"]["matrix"]
     assert left["pose"]["position"] == stored["cameras"][0]["pose"]["position"]
-
-
-@pytest.mark.long
-def test_a_stored_pose_that_looks_at_the_sky_is_refused_by_the_name_of_its_camera_and_the_other_is_calibrated(
-    service, name
-):
-    job = calibrated(service, venue(name, right_turn=np.array([1.2, 0.0, 0.0])), frames())
-    left, right = job["result"]["cameras"]
-    assert (left["accepted"], right["accepted"]) == (True, False)
-    assert right["refusal"] == "/refusals/no-markings-in-view"
-    assert "first pose" in right["rejected_because"]
-    assert service.http.get("/readyz").status_code == 200
 
 
 @pytest.mark.long

@@ -37,23 +37,6 @@ def test_a_venue_without_rules_is_ok_whatever_happens(stock):
     assert stock.venues.health("nowhere") is None
 
 
-def test_rejections_in_a_row_ring_once_and_an_accepted_calibration_ends_it(stock):
-    watched(stock, rejected_in_a_row=3)
-    stock.calibrated("v", accepted=False)
-    failed(stock)
-    stock.calibrated("v", accepted=False, dry_run=True)
-    failed(stock, dry_run=True)
-    assert (rings(stock), stock.venues.health("v").rejected_in_a_row) == ([], 2)
-    for _ in range(3):
-        stock.calibrated("v", accepted=False)
-    (alarm,) = stock.venues.health("v").alarms
-    assert alarm.why == "The last 5 calibrations were rejected or failed."
-    assert told(stock) == [("rejected-in-a-row", "began")]
-    stock.calibrated("v")
-    assert rings(stock) == []
-    assert told(stock) == [("rejected-in-a-row", "began"), ("rejected-in-a-row", "ended")]
-
-
 def test_taking_a_rejected_result_by_hand_ends_the_row(stock):
     watched(stock, rejected_in_a_row=1)
     job = stock.calibrated("v", accepted=False)

@@ -36,6 +36,10 @@ def outdated():
     return [moved(c, TURN, SHIFT) for c in pair()]
 
 
+def in_wind():
+    return [moved(c, *WIND) for c in pair()]
+
+
 def run(cameras=None, pictures=None, **options):
     return calibrate(CROWNED, cameras or outdated(), pictures or frames(), white_on_green, Options(**options))
 

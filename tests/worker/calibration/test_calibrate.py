@@ -9,6 +9,7 @@ from testbed.synthetic import CROWNED, moved, pair
 from tests.worker.calibration.outdated_pair import (
     SHIFT,
     frames,
+    in_wind,
     outdated,
     result,
     run,
@@ -63,20 +64,20 @@ def test_lines_that_the_network_has_never_learnt_are_found_by_their_ridges():
 
 
 def test_one_camera_alone_has_no_stitch_error():
-    found = run(cameras=outdated()[:1])
+    found = run(cameras=in_wind()[:1])
     assert found.stitch_error_px is None
     assert found.accepted
 
 
 def test_black_frames_are_rejected_and_the_camera_is_named():
     dark = {"left": frames()["left"], "right": (np.zeros_like(frames()["right"][0]),)}
-    found = run(pictures=dark)
+    found = run(cameras=in_wind(), pictures=dark)
     assert found.rejected_because.startswith("camera right: Dark")
     assert "camera left" not in found.rejected_because
 
 
 def test_a_stored_pose_that_looks_at_the_sky_is_refused_and_the_other_camera_is_calibrated():
-    left, right = outdated()
+    left, right = in_wind()
     found = run(cameras=[left, moved(right, (1.2, 0, 0))])
     assert [camera.accepted for camera in found.cameras] == [True, False]
     assert found.cameras[1].refusal.reason == "no-markings-in-view"
@@ -141,7 +142,7 @@ def test_a_focal_length_that_heat_has_changed_is_found_when_asked_for():
 
 
 def test_a_lens_that_is_not_the_one_that_was_given_is_suspected_with_its_numbers():
-    left, right = outdated()
+    left, right = in_wind()
     other = replace(left.intrinsics, distortion=left.intrinsics.distortion + [0.02, 0, 0, 0, 0])
     found = run(cameras=[replace(left, intrinsics=other), right])
     told = {(s.camera, s.quantity): s for s in found.suspicions}

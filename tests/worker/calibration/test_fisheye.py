@@ -53,24 +53,6 @@ def test_the_ray_of_a_rays_pixel_is_that_ray(distortion, angle, turn):
     np.testing.assert_allclose(ours.undistort(ours.distort(ray)), ray, atol=1e-7 * (1 + ray @ ray))
 
 
-@given(terms, st.floats(5, 30), st.floats(-40, 40))
-def test_the_ray_through_a_projected_point_meets_the_point_again(distortion, height, aside):
-    dome = Camera("dome", lens(distortion), Pose.looking_at([aside, -45, height], [0, 0, 0]))
-    points = np.random.default_rng(0).uniform([-52, -34, 0], [52, 34, 0], size=(50, 3))
-    pixels = dome.project(points)
-    seen = inside(pixels, SIZE)
-    rays = dome.rays(pixels[seen])
-    met = dome.pose.position + rays * (-dome.pose.position[2] / rays[:, 2:])
-    np.testing.assert_allclose(met, points[seen], atol=1e-5)
-
-
-def test_pixels_come_back_as_opencv_undistorts_them():
-    dome = camera()
-    pixels = np.random.default_rng(0).uniform([300, 100], [1600, 1000], size=(200, 2))
-    theirs = cv2.fisheye.undistortPoints(pixels[:, None], dome.intrinsics.matrix, dome.intrinsics.distortion)[:, 0]
-    np.testing.assert_allclose(dome.intrinsics.undistort(pixels), theirs, atol=1e-5)
-
-
 def test_a_population_is_projected_as_its_members_are_and_as_opencv_projects_them():
     dome, rng = camera(), np.random.default_rng(2)
     rotations = dome.pose.rotation + 0.02 * rng.normal(size=(6, 3))

@@ -43,6 +43,7 @@ def test_cameras_that_hardly_moved_are_found_without_a_search():
     assert off_m(nearby()) < 0.02
 
 
+@pytest.mark.long
 def test_they_are_found_where_a_search_finds_them():
     searched = calibrated(search="wide")
     assert (searched.path, searched.verdict) == ("wide", "accepted")
@@ -163,7 +164,7 @@ def test_nobody_is_told_of_looking_nearby_in_vain():
     steps = []
     started = [moved(one, *STORM) for one in pair()]
     frames = {one.id: [frame] for one, frame in zip(pair(), pair_frames(), strict=True)}
-    calibrate(CROWNED, started, frames, white_on_green, Options(seed=5, generations=10), steps.append)
+    calibrate(CROWNED, started, frames, white_on_green, Options(seed=5, generations=5, recover="never"), steps.append)
     assert list(dict.fromkeys(step.stage for step in steps)) == ["segmentation", "evolution", "refinement"]
 
 

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from fields.template import load
-from testbed.parameters import try_first
 from testbed.synthetic import camera, moved
 from tests.worker.calibration.outdated_pair import SHIFT, TURN, white_on_green
 from tests.worker.calibration.sports import SPORTS, cameras, field, frames
@@ -17,10 +16,9 @@ from worker.calibration.rendering.stitched_pictures import birdseye
 
 pytestmark = pytest.mark.slow
 
-every_sport = pytest.mark.parametrize("sport", try_first(SPORTS))
 
-
-@every_sport
+@pytest.mark.long
+@pytest.mark.parametrize("sport", SPORTS)
 def test_outdated_poses_are_found_again(sport):
     outdated = [moved(c, TURN, SHIFT) for c in cameras(sport)]
     found = calibrate(field(sport), outdated, frames(sport), white_on_green, Options(seed=3))

@@ -39,7 +39,7 @@ def believed(longer: float) -> Camera:
 
 @cache
 def calibrated(longer: float, lens_may_drift: bool) -> Calibration:
-    options = Options(seed=1, generations=60, lens_may_drift=lens_may_drift)
+    options = Options(seed=1, generations=20, lens_may_drift=lens_may_drift)
     return calibrate(SQUARE, [believed(longer)], {"tele": [picture()]}, white_on_green, options)
 
 
@@ -52,14 +52,6 @@ def test_a_lens_that_has_not_changed_is_not_doubted():
     assert found.accepted
     assert not found.cameras[0].lens_found
     assert off_m(found) < 3 * found.cameras[0].sigma.position_m < 0.3
-
-
-def test_a_lens_that_nobody_vouches_for_leaves_open_how_far_off_a_camera_stands_that_sees_little():
-    stated = calibrated(0.0, lens_may_drift=False).cameras[0]
-    unstated = moved(plane(), *WIND)
-    (found,) = calibrate(SQUARE, [unstated], {"tele": [picture()]}, white_on_green, Options(seed=1)).cameras
-    assert found.accepted
-    assert stated.sigma.position_m < 0.05 < 0.1 < found.sigma.position_m < 0.3
 
 
 @pytest.mark.parametrize("longer", try_first([ZOOM, -ZOOM]))

@@ -420,13 +420,6 @@ def test_the_orientation_a_camera_writes_into_its_files_is_not_obeyed(venue, fil
     assert asked["frames"]["right"][0].shape == (180, 320, 3)
 
 
-def test_a_frame_that_cannot_be_decoded_fails_by_the_name_of_its_camera(venue, files, asked, means):
-    files["right"] = [b"\xff\xd8\xff\xda\0\x02\xff\xd9"]
-    with pytest.raises(from_schemas.JobFailedError) as failure:
-        solve(venue, files, Options(), means, lambda _: None)
-    assert (failure.value.error["type"], failure.value.error["camera"]) == ("/problems/broken-image", "right")
-
-
 def test_a_frame_of_another_shape_fails_with_both_sizes(venue, files, asked, means):
     files["right"] = [cv2.imencode(".png", np.zeros((48, 64, 3), np.uint8))[1].tobytes()]
     with pytest.raises(

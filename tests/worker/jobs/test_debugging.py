@@ -36,7 +36,10 @@ def smaller_demo():
 
 def solved(recorder=NOT_RECORDED):
     venue, files = smaller_demo()
-    resources, options = ComputeResources(model=MODEL_BESIDE_THE_CODE, threads=1), Options(seed=1, search="wide")
+    resources, options = (
+        ComputeResources(model=MODEL_BESIDE_THE_CODE, threads=1),
+        Options(seed=1, search="wide", generations=20),
+    )
     return solve(venue, files, options, resources, lambda _: None, recorder=recorder).result
 
 

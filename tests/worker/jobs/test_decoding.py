@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
+from testbed.parameters import try_first
 from tests.worker.jobs.damage import DAMAGES, damage, is_visible, scan_of, whole_files, without_tables
 from worker.jobs.decoding import decode_frame, decode_image
 from worker.jobs.from_schemas import JobFailedError
@@ -22,7 +23,7 @@ def as_opencv_reads(file, flags=cv2.IMREAD_COLOR_BGR):
     return cv2.imdecode(np.frombuffer(file, np.uint8), flags | cv2.IMREAD_IGNORE_ORIENTATION)
 
 
-@pytest.mark.parametrize("cropped", [(0, 0), (7, 9)])
+@pytest.mark.parametrize("cropped", try_first([[7, 9], [0, 0]]))
 def test_whole_pictures_of_all_encoders_are_read_to_the_pixels_that_opencv_reads(cropped):
     scene = SCENE[: SCENE.shape[0] - cropped[0], : SCENE.shape[1] - cropped[1]]
     for name, file in whole_files(scene, (60, 95)):
@@ -137,12 +138,6 @@ def test_a_frame_of_the_same_shape_is_resized_and_that_is_told(width, height):
     assert frame.shape == SCENE.shape
     assert np.abs(frame.astype(int) - SCENE).mean() < 8
     assert f"camera left sent {width}x{height} pixels, and its lens is for {size[0]}x{size[1]}" in remarks[0]
-
-
-def test_a_frame_of_another_shape_fails():
-    other = cv2.imencode(".png", SCENE[:, :-100])[1].tobytes()
-    with pytest.raises(JobFailedError, match="is of another shape: cropped, squeezed"):
-        decode_frame("left", SCENE.shape[1::-1], other)
 
 
 @pytest.mark.parametrize("bits", [10, 12, 14, 16])

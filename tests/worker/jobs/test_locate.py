@@ -78,15 +78,6 @@ def test_a_lens_that_was_measured_badly_is_no_exchange():
     assert found["left"].lens is not None
 
 
-@pytest.mark.long
-def test_two_lenses_that_were_measured_badly_are_no_exchange():
-    found = located(
-        {"left": lens(1190, centre=(90, -70)), "right": lens(1480, centre=(-80, 60))},
-        {"left": clicked(ONE, LEFT, 1), "right": clicked(lens(1400), RIGHT, 2)},
-    )
-    assert all(result.accepted for result in found.values())
-
-
 def stored():
     return {name: geometry.Pose(**pose_to_schema(pose)) for name, pose in (("left", LEFT), ("right", RIGHT))}
 

@@ -6,7 +6,7 @@ from pydantic import ValidationError
 
 from service.formats.opentrackio import AHEAD_IS_Y, pan_tilt_roll
 from service.schemas.find import SoughtSite
-from service.schemas.plan import PlannedSite
+from service.schemas.plan import PlannedSite, PlanResult
 from testbed.synthetic import CROWNED, PITCH, pair
 from testbed.venue_documents import venue_document
 from worker.jobs import planning
@@ -52,6 +52,10 @@ def test_pan_tilt_and_roll_are_those_that_a_tracker_would_send():
         (CAMERA | {"pan_deg": 0.0, "field_of_view_deg": 70}, "camera left needs one direction"),
         (CAMERA | {"look_at": [0.0, 0.0]}, "camera left needs one lens"),
         (AIMED | {"focal_length_mm": 4.0}, "camera left needs one lens"),
+        (
+            CAMERA | {"look_at": [0.0, 0.0], "focal_length_mm": 0.001, "sensor_width_mm": 8.0},
+            "expected a field of view of 2 to 150 degrees, focal_length_mm and sensor_width_mm make 180",
+        ),
         (AIMED | {"position": [0.0, 0.0, -1.0]}, "must be above the pitch"),
         (AIMED | {"position": [-20.0, 0.0, 12.0]}, "looks straight down"),
     ],
@@ -69,7 +73,8 @@ def test_a_whole_venue_is_planned_at_its_stored_poses():
     assert {"halfway line", "centre circle"} <= set(found.result.pairs[0].markings_m)
     assert sum(found.result.covered.values()) == pytest.approx(1.0, abs=1e-3)
     assert len(found.maps.place_m) == len(found.maps.y_m)
-    assert {"place.png", "coverage.png", "pixels-per-metre.png", "place-left.png"} <= set(found.pictures)
+    pictures = planning.draw_field_maps(found.plan) | planning.draw_camera_maps(found.plan)
+    assert pictures.keys() == {"place", "coverage", "pixels-per-metre", "place-left", "place-right"}
 
 
 def test_a_stand_gets_cameras_and_the_plan_is_a_site_to_search_for_them():
@@ -81,6 +86,21 @@ def test_a_stand_gets_cameras_and_the_plan_is_a_site_to_search_for_them():
     sought = SoughtSite.model_validate_json(place.to_sought(found).model_dump_json(exclude_none=True))
     assert sought.sought == ["mast-1", "mast-2"]
     assert sought.cameras[0].field_of_view_deg == found.cameras[0].field_of_view_deg
+
+
+@pytest.mark.parametrize(
+    "camera",
+    [
+        # Its rays end before the edges of the picture.
+        {"intrinsics": {"matrix": [[1e3, 0, 959.5], [0, 1e3, 539.5], [0, 0, 1]], "distortion": [-2.0, 0.08, 0, 0]}},
+        # It sees a mark, and no cell of the map.
+        {"field_of_view_deg": 2, "image_size": [1920, 64], "position": [-1.0, 0.0, 300.0], "look_at": [0.0, -1.0]},
+    ],
+)
+def test_a_lens_without_edges_and_a_view_of_a_spot_have_a_plan_of_numbers_alone(camera):
+    given = {"field": {"template": "hockey"}, "cameras": [CAMERA | {"look_at": [0.0, 0.0]} | camera]}
+    found = planning.solve(PlannedSite.model_validate(given), "fresh", 0.0).result
+    assert PlanResult.model_validate_json(found.model_dump_json()) == found
 
 
 def test_a_plan_of_nothing_is_refused():

@@ -25,6 +25,7 @@ from tests.worker.certificates import certificate
 from tests.worker.receiver import TELLTALE
 from tests.worker.sources.streaming_camera import ASKS, SIZE, Film, Stranger, StreamingCamera
 from worker.programs import snapshot
+from worker.sources.errors import CameraError
 from worker.sources.rtsp_relay import Relay
 
 pytestmark = pytest.mark.slow
@@ -233,10 +234,20 @@ def test_nothing_that_the_host_of_a_source_says_is_read_through_its_refusal(tmp_
     assert "bytearray" not in refusal.value.detail
 
 
-def test_of_a_name_with_several_addresses_those_alone_are_called_that_are_permitted(tmp_path, monkeypatch):
-    task = SourceTask(
-        sources={}, allowed=["10.1.0.0/16"], folder=str(tmp_path), seconds=1.0, most_bytes=1000, most_pixels=1000
+def test_a_stream_that_is_given_up_is_late_and_not_one_that_cannot_be_opened(tmp_path, monkeypatch):
+    monkeypatch.setenv("OPENCV_FFMPEG_CAPTURE_OPTIONS", "")
+    with socket.create_server(("127.0.0.1", 0)) as silent, pytest.raises(CameraError, match=r"no frame within 0\.2 s"):
+        snapshot._fetch(httpx.URL(f"rtsp://127.0.0.1:{silent.getsockname()[1]}/live"), None, asked(tmp_path, 0.2))
+
+
+def asked(folder, seconds):
+    permitted = ["10.1.0.0/16", "127.0.0.1"]
+    return SourceTask(
+        sources={}, allowed=permitted, folder=str(folder), seconds=seconds, most_bytes=1000, most_pixels=1000
     )
+
+
+def test_of_a_name_with_several_addresses_those_alone_are_called_that_are_permitted(tmp_path, monkeypatch):
     called = []
 
     async def fetch_picture(_, addresses, *__):
@@ -245,5 +256,5 @@ def test_of_a_name_with_several_addresses_those_alone_are_called_that_are_permit
 
     monkeypatch.setattr(snapshot.outbound_guard, "look_up", lambda _: ["169.254.169.254", "10.1.0.7", "10.2.0.7"])
     monkeypatch.setattr(snapshot, "fetch_picture", fetch_picture)
-    assert snapshot._fetch(httpx.URL("http://camera.example/left.jpg"), None, task) == b"a picture"
+    assert snapshot._fetch(httpx.URL("http://camera.example/left.jpg"), None, asked(tmp_path, 1.0)) == b"a picture"
     assert called == ["10.1.0.7"]

@@ -73,6 +73,7 @@ def test_a_camera_whose_pictures_stay_away_or_whose_connection_breaks_is_tracked
     measured(tracking)
 
 
+@pytest.mark.long
 def test_a_frozen_picture_is_not_measured_until_it_moves_again(camera):
     cameras, tracking = camera
     cameras.happen("freeze", 0)

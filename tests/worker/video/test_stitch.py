@@ -103,7 +103,9 @@ def test_clips_that_began_apart_are_put_in_time(tmp_path):
     pictures = frames_of(tmp_path / "pano.mov")
     begin = found.offsets["right"]
     assert 2 * player_seen(pictures[50], expected(begin + 2)) < player_seen(pictures[50], expected(begin + 2.4))
-    given = stitch(SCENE, clips, Plan(str(tmp_path / "two.mkv"), {"right": Offset(12, in_frames=True)}), told)
+    given = stitch(
+        SCENE, clips, Plan(str(tmp_path / "two.mkv"), {"right": Offset(12, in_frames=True)}, end_s=0.8), told
+    )
     assert given.offsets == {"left": 0.0, "right": 0.4}
     assert given.found == {}
 
@@ -118,7 +120,7 @@ def test_an_offset_that_cannot_be_found_is_not_made_up(tmp_path):
         match=r"not found within 2 s: nothing moves .*Nothing was made: .*--offset right=0 if they began together$",
     ):
         stitch(SCENE, clips, Plan(str(tmp_path / "pano.mp4")), told)
-    assert stitch(SCENE, clips, Plan(str(tmp_path / "pano.mp4"), TOGETHER), told).frames == 75
+    assert stitch(SCENE, clips, Plan(str(tmp_path / "pano.mp4"), TOGETHER, end_s=0.4), told).frames == 10
 
 
 def test_uneven_and_slow_clips_become_even_ones(tmp_path):
@@ -305,7 +307,7 @@ def test_the_sound_of_a_camera_stays_with_its_pictures(tmp_path, sound, suffix, 
     assert probed(tmp_path / "pano.mp4")["audio"]["codec_name"] == kept
     # Tones are at whole seconds of the world; the view begins at 0.7. The first bits of a coded tone are soft.
     assert beeps(tmp_path / "pano.mp4") == pytest.approx([0.3, 1.3, 2.3], abs=0.03)
-    stitch(SCENE, clips, Plan(str(tmp_path / "silent.mp4"), {"right": Offset(0.4)}, sound="none"), told)
+    stitch(SCENE, clips, Plan(str(tmp_path / "silent.mp4"), {"right": Offset(0.4)}, end_s=0.8, sound="none"), told)
     assert list(probed(tmp_path / "silent.mp4")) == ["video"]
     with pytest.raises(VideoError, match="--audio: the clip of camera left has no sound"):
         stitch(SCENE, clips, Plan(str(tmp_path / "x.mp4"), TOGETHER, sound="left"), told)

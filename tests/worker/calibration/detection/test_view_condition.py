@@ -46,8 +46,7 @@ def fair():
             {"snow": 0.4, "light": "cloud"},
             {"blur": 1.0, "jpeg_quality": 50},
             {"wear": 0.9, "mowing": 1.0, "turf": "natural"},
-        ],
-        3,
+        ]
     ),
     ids=lambda conditions: " ".join(conditions) or "fair",
 )

@@ -57,12 +57,9 @@ def placed(true: Camera, believed: Camera, pitch: Field = PITCH) -> Array:
 
 
 def test_true_poses_agree() -> None:
-    assert register(LEFT, RIGHT).error_px < 0.02
-    assert register(LEFT, RIGHT).support > 60
-
-
-def test_true_poses_agree_on_a_crowned_pitch() -> None:
-    assert register(LEFT, RIGHT, CROWNED, crowned=True).error_px < 0.02
+    found = register(LEFT, RIGHT, CROWNED, crowned=True)
+    assert found.error_px < 0.02
+    assert found.support > 60
 
 
 def test_cameras_that_face_each_other_agree_in_spite_of_opposite_smears() -> None:
@@ -70,13 +67,8 @@ def test_cameras_that_face_each_other_agree_in_spite_of_opposite_smears() -> Non
     assert register(LEFT, FACING).error_px < 0.2
 
 
-def test_a_camera_moved_sideways_shows_by_how_much() -> None:
-    found = register(LEFT, moved(RIGHT, by=(0.2, 0.0, 0.0)))
-    assert (found.dx_px, found.dy_px) == pytest.approx((2.0, 0.0), abs=0.05)
-
-
 @pytest.mark.parametrize("seed", try_first(range(3)))
-@pytest.mark.parametrize(("turn_rad", "tolerance"), [(0.001, 0.1), (0.004, 0.15), (0.01, 0.8)])
+@pytest.mark.parametrize(("turn_rad", "tolerance"), try_first([(0.004, 0.15), (0.001, 0.1), (0.01, 0.8)]))
 def test_wrong_poses_show_how_far_apart_they_put_the_centre(seed: int, turn_rad: float, tolerance: float) -> None:
     random = np.random.default_rng(seed)
     believed = [moved(one, random.normal(0, turn_rad / 1.7, 3), random.normal(0, 0.05, 3)) for one in (LEFT, RIGHT)]
@@ -85,7 +77,7 @@ def test_wrong_poses_show_how_far_apart_they_put_the_centre(seed: int, turn_rad:
     assert (found.dx_px, found.dy_px) == pytest.approx(tuple(true), abs=tolerance)
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", try_first(range(3)))
 def test_what_other_poses_make_of_the_same_views_is_told_without_looking_again(seed: int) -> None:
     random = np.random.default_rng(seed)
     others = [moved(one, random.normal(0, 0.004, 3), random.normal(0, 0.1, 3)) for one in (LEFT, RIGHT)]
@@ -183,7 +175,7 @@ def test_the_number_of_threads_changes_no_digit() -> None:
     assert one == two
 
 
-@pytest.mark.parametrize("degrees", [6.0, -6.0])
+@pytest.mark.parametrize("degrees", try_first([6.0, -6.0]))
 def test_a_halfway_line_that_has_slid_along_itself_is_no_registration(degrees: float) -> None:
     # The circles are tens of metres apart, and the halfway line fits itself wherever it is.
     turn = rotation_matrices(np.radians([degrees, 0.0, 0.0]))

@@ -84,6 +84,7 @@ def test_markings_of_ones_own_are_where_their_coordinates_say_and_it_is_said_so(
     assert (refined.pitch.length, refined.pitch.width) == (40.0, 20.0)
 
 
+@pytest.mark.long
 def test_a_flat_pitch_has_no_ridge_worth_mentioning_and_none_whose_length_could_be_told():
     refined, measures = centre_only()
     height, length = measures["ridge_height_m"], measures["ridge_length_m"]

@@ -62,7 +62,7 @@ def by_pose(one, points):
     return differences(lambda change: moved(one, change).project(points), POSE_STEPS)
 
 
-@settings(max_examples=40)
+@settings(max_examples=15)
 @given(lenses, aside, heights, aside, angles)
 def test_pixels_move_as_they_do_after_small_changes_of_the_pose(name, x, height, target, roll):
     one = camera(name, x, height, target, roll)
@@ -70,7 +70,7 @@ def test_pixels_move_as_they_do_after_small_changes_of_the_pose(name, x, height,
     assert_alike(pixel_jacobian(one, points), by_pose(one, points), of=(0, 1))
 
 
-@settings(max_examples=40)
+@settings(max_examples=15)
 @given(lenses, aside, heights, aside, angles)
 def test_pixels_move_as_they_do_after_small_changes_of_the_lens(name, x, height, target, roll):
     one = camera(name, x, height, target, roll)
@@ -79,7 +79,7 @@ def test_pixels_move_as_they_do_after_small_changes_of_the_lens(name, x, height,
     assert_alike(lens_jacobian(one, points), expected, of=(0, 1))
 
 
-@settings(max_examples=40)
+@settings(max_examples=15)
 @given(lenses, aside, heights, aside, angles)
 def test_what_is_seen_on_the_ground_moves_as_a_pose_that_is_a_little_wrong_puts_it(name, x, height, target, roll):
     one = camera(name, x, height, target, roll)

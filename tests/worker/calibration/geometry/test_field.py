@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fields.template import Template, load
+from testbed.parameters import try_first
 from testbed.synthetic import CROWNED, PITCH
 from tests.worker.calibration import sports
 from worker.calibration.geometry.field import Field, marks_with_free_ends, resample
@@ -49,13 +50,6 @@ def test_corner_arcs_lie_inside_the_pitch():
         arc = by_name(PITCH, f"{name} corner arc").centre
         assert (np.abs(arc) <= [52.5 + 1e-9, 34 + 1e-9]).all()
         np.testing.assert_allclose(np.linalg.norm(np.abs(arc) - [52.5, 34], axis=1), 0.94)
-
-
-def test_both_halves_are_mirror_images():
-    points = PITCH.line_points().position[:, :2]
-    mirrored = points * [-1, 1]
-    distance = np.linalg.norm(points[:, None] - mirrored[None], axis=2).min(axis=1)
-    assert distance.max() < 0.13
 
 
 def test_the_roof_is_flat_at_the_boundary_and_highest_along_the_ridge():
@@ -163,9 +157,9 @@ def test_markings_have_the_colour_of_their_paint():
 
 
 @pytest.mark.parametrize(
-    ("sport", "usual"), [("handball", (40, 20)), ("handball", (38, 18.4)), ("rugby-union", (120, 68))]
+    ("sport", "usual"), try_first([("handball", (40, 20)), ("handball", (38, 18.4)), ("rugby-union", (120, 68))])
 )
-@settings(max_examples=30)
+@settings(max_examples=10)
 @given(by=st.floats(-1.5, 1.5))
 def test_a_resized_field_has_the_same_dashes_where_its_broken_lines_are_now(sport, usual, by):
     template = load(sport)

@@ -7,7 +7,6 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from fields.landmarks import UnknownLandmark
 from testbed.parameters import try_first
 from worker.calibration.geometry.camera import Camera, Pose, inside
 from worker.calibration.geometry.field import Field
@@ -72,7 +71,7 @@ def far(found, camera=CAMERA):
     )
 
 
-@settings(max_examples=5)
+@settings(max_examples=3)
 @given(st.floats(-30, 30), st.floats(4, 25), st.floats(-25, 25), st.floats(-3, 3))
 def test_the_pose_of_a_camera_anywhere_beside_the_pitch_is_found(aside, height, target, roll):
     camera = CAMERA.with_pose(Pose.looking_at([aside, -46.0, height], [target, 0.0, 0.0], roll))
@@ -247,7 +246,7 @@ def misplaced(given_, which, seed):
 
 
 @pytest.mark.parametrize("seed", try_first(range(2)))
-@pytest.mark.parametrize("kind", ["wide", "tele", "fisheye"])
+@pytest.mark.parametrize("kind", try_first(["wide", "tele", "fisheye"]))
 def test_a_pose_is_not_believed_on_one_point_beside_a_line_right_or_wrong(kind, seed):
     camera, line, (beside, _) = seen_by(kind)
     given_ = misplaced(clicked(camera, [*line, beside], seed), [8], seed)
@@ -257,7 +256,7 @@ def test_a_pose_is_not_believed_on_one_point_beside_a_line_right_or_wrong(kind, 
 
 
 @pytest.mark.parametrize("seed", try_first(range(2)))
-@pytest.mark.parametrize("kind", ["wide", "tele", "fisheye"])
+@pytest.mark.parametrize("kind", try_first(["wide", "tele", "fisheye"]))
 def test_points_that_are_doubted_do_not_hold_a_camera_that_the_others_let_turn_around_a_line(kind, seed):
     camera, line, beside = seen_by(kind)
     given_ = misplaced(clicked(camera, [*line, *beside], seed), [8, 9], seed)
@@ -267,7 +266,7 @@ def test_points_that_are_doubted_do_not_hold_a_camera_that_the_others_let_turn_a
     assert found.rejected_because.startswith("all points but those doubted and 8 lie on one line")
 
 
-@pytest.mark.parametrize("kind", ["wide", "tele", "fisheye"])
+@pytest.mark.parametrize("kind", try_first(["wide", "tele", "fisheye"]))
 def test_two_right_points_beside_a_line_fix_the_pose(kind):
     camera, line, beside = seen_by(kind)
     found = first_pose(clicked(camera, [*line, *beside], 0), camera.intrinsics, NAMED)
@@ -278,7 +277,7 @@ def test_two_right_points_beside_a_line_fix_the_pose(kind):
     assert not any(click.doubted for click in found.clicks)
 
 
-@pytest.mark.parametrize("kind", ["wide", "tele", "fisheye"])
+@pytest.mark.parametrize("kind", try_first(["wide", "tele", "fisheye"]))
 def test_what_points_on_a_line_leave_open_is_not_called_sure(kind):
     camera, line, _ = seen_by(kind)
     covariance = fit(clicked(camera, line, 0), camera).covariance
@@ -378,16 +377,6 @@ def test_two_terms_come_near_a_lens_that_has_more():
     x, y = np.meshgrid(np.linspace(0, 1919, 15), np.linspace(0, 1079, 9))
     pixels = np.stack([x, y], axis=-1)
     assert np.abs(simple.distort(rich.undistort(pixels)) - pixels).max() < 12
-
-
-@pytest.mark.parametrize("said", ["left penalty area, near corner", "Left Penalty  Area near corner", "CENTER MARK"])
-def test_a_landmark_is_found_by_its_name_however_it_is_written(said):
-    assert PITCH.place(said).tolist() in [point.tolist() for point in NAMED.values()]
-
-
-def test_an_unknown_landmark_is_refused_with_those_it_may_be():
-    with pytest.raises(UnknownLandmark, match="left penalty area, near corner"):
-        PITCH.place("left penalty box, near corner")
 
 
 def test_landmarks_lie_on_the_markings():

@@ -11,6 +11,7 @@ from worker.calibration.geometry.lens import LENSES
 from worker.calibration.geometry.rotation import rotation_matrices
 from worker.calibration.onboarding.boards import Board, BoardDetection, Charuco, find_board, other_size
 from worker.calibration.onboarding.lens_calibration import (
+    LADDERS,
     Photo,
     UndeterminedLensError,
     calibrate_lens,
@@ -74,7 +75,7 @@ def calibrated(model):
 
 @cache
 def from_the_left():
-    return calibrate_lens([p for p in photos(count=40) if (p.detection.pixel[:, 0] < 750).all()], "opencv")
+    return calibrate_lens([p for p in photos(count=24) if (p.detection.pixel[:, 0] < 750).all()], "opencv")
 
 
 def paper(board):
@@ -192,8 +193,9 @@ def test_a_principal_point_that_was_left_in_the_middle_is_known_as_well_as_photo
     assert set(found.sigma) == {"f", "k1"}
 
 
-def test_how_well_the_ratio_of_both_focal_lengths_is_known_is_told_where_both_are_free():
-    sigma = calibrated("fisheye").lens.sigma
+def test_how_well_the_ratio_of_both_focal_lengths_is_known_is_told_where_both_are_free(monkeypatch):
+    monkeypatch.setitem(LADDERS, "fisheye", LADDERS["fisheye"][:1])
+    sigma = calibrate_lens(photos("fisheye", count=6), "fisheye").lens.sigma
     assert 0 < sigma["aspect"] < sigma["fx"] / 520
     assert "f" not in sigma
 
@@ -219,7 +221,7 @@ def test_a_photo_that_hurts_is_named_and_left_out():
 
 
 def test_photos_without_a_board_of_another_size_and_blurred_ones_are_named():
-    given = photos()
+    given = photos(count=9)
     soft = BoardDetection(given[2].detection.world, given[2].detection.pixel, 15.0)
     odd = [Photo("empty.jpg", SIZE, None), Photo("small.jpg", (640, 480), given[0].detection)]
     found = calibrate_lens([*odd, Photo("soft.jpg", SIZE, soft), *given[3:]], "opencv")

@@ -6,7 +6,6 @@ from functools import cache
 import numpy as np
 import pytest
 
-from testbed.parameters import try_first
 from testbed.synthetic import BARREL, PITCH, camera, paint_frame
 from tests.worker.calibration.outdated_pair import white_on_green
 from tests.worker.calibration.sports import field
@@ -61,8 +60,9 @@ def off_px(pitch, truth, best):
     return min(np.linalg.norm(one.project(lines[seen]) - there[seen], axis=1).mean() for one in (best, twin(best)))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
-    ("sport", "truth"), try_first([("football", "SIDELINE"), ("football", "BEHIND_A_GOAL"), ("basketball", "COURT")])
+    ("sport", "truth"), [("football", "SIDELINE"), ("football", "BEHIND_A_GOAL"), ("basketball", "COURT")]
 )
 def test_a_camera_of_a_known_lens_is_found(sport, truth):
     pitch, camera, answer = found(sport, truth, lens_is_known=True)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from testbed.parameters import try_first
 from testbed.synthetic import (
     CROWNED,
     GRASS,
@@ -117,6 +118,7 @@ def test_feathers_sum_to_one_wherever_a_camera_sees() -> None:
     assert (total[:5] == 0).all()
 
 
+@pytest.mark.long
 def test_the_geometry_of_the_preview_is_exact_to_a_twentieth_of_a_pixel() -> None:
     size = (3840, 2160)
     lens = (-0.34, 0.104, 0.0, 0.0, 0.0)
@@ -134,7 +136,7 @@ def test_the_geometry_of_the_preview_is_exact_to_a_twentieth_of_a_pixel() -> Non
         assert np.quantile(np.linalg.norm(exact - quick, axis=-1)[judged], 0.999) < 0.05
 
 
-@pytest.mark.parametrize("count", [1, 3])
+@pytest.mark.parametrize("count", try_first([3, 1]))
 def test_any_number_of_cameras_in_a_row(count: int) -> None:
     cameras = row() if count == 3 else row()[1:2]
     pictures = {one.id: paint_frame(CROWNED, one) for one in cameras}

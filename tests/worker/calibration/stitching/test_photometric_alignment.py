@@ -1,5 +1,7 @@
 """What makes two cameras' pictures differ in brightness is found in their overlap, and players do not move it."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -18,6 +20,11 @@ SIZE = CAMERAS[0].intrinsics.size
 
 def textured():
     """Frames of both cameras, with slow changes of brightness that both see on the ground."""
+    return {camera: frame.copy() for camera, frame in _textured().items()}
+
+
+@cache
+def _textured():
     left, right = pair_frames()
     frames = {}
     for camera, frame in zip(CAMERAS, (left, right), strict=True):

@@ -21,7 +21,7 @@ from worker.calibration.tracking.follower import CameraTracker, TrackedMoment
 pytestmark = pytest.mark.slow
 
 FRAMES_PER_SECOND = 25.0
-COUNT = 40
+COUNT = 26
 LEFT = pair()[0]
 STORED = moved(LEFT, (0.0012, -0.0008, 0.0005), (0.01, 0.005, -0.01))
 
@@ -60,12 +60,12 @@ def followed_as_it_is(every: int, look_ahead: int) -> list[TrackedMoment]:
 
 
 def followed(
-    frames: Mapping[int, np.ndarray | None] | None = None, every: int = 1, look_ahead: int = 0
+    frames: Mapping[int, np.ndarray | None] | None = None, every: int = 1, look_ahead: int = 0, count: int = COUNT
 ) -> list[TrackedMoment]:
-    """The clip, with some of its frames replaced; None is none."""
+    """The first frames of the clip, some of them replaced; None is none."""
     follower = CameraTracker(CROWNED, [STORED], {"left": frame(0)}, FRAMES_PER_SECOND, every, look_ahead)
     told: list[TrackedMoment] = []
-    for number in range(1, COUNT):
+    for number in range(1, count):
         replaced = frames or {}
         picture = replaced[number] if number in replaced else frame(number)
         now = follower.see({} if picture is None else {"left": Channels([picture])})
@@ -90,7 +90,7 @@ def sigma_deg(moment: TrackedMoment) -> float:
     return moment.cameras[0].motion_sigma.rotation_deg
 
 
-@pytest.mark.parametrize(("every", "look_ahead"), try_first([(2, 10), (1, 0), (1, 10)]))
+@pytest.mark.parametrize(("every", "look_ahead"), try_first([(1, 0), (2, 10), (1, 10)]))
 def test_a_shaking_camera_is_followed_to_a_fraction_of_a_pixel_and_every_frame_is_told_once(every, look_ahead):
     moments = followed_as_it_is(every, look_ahead)
     assert [moment.number for moment in moments] == list(range(COUNT))
@@ -134,7 +134,7 @@ def test_where_it_will_be_is_told_with_a_sigma_that_covers_it():
 
 def test_without_frames_it_coasts_with_a_sigma_that_grows_and_is_found_again():
     gap = range(12, 24)
-    moments = followed(dict.fromkeys(gap))
+    moments = followed(dict.fromkeys(gap), count=30)
     assert [number for number, one in enumerate(how(moments)) if one == "coasted"] == list(gap)
     growing = [sigma_deg(moments[number]) for number in gap]
     assert growing == sorted(growing)
@@ -143,8 +143,8 @@ def test_without_frames_it_coasts_with_a_sigma_that_grows_and_is_found_again():
 
 
 def test_where_a_frame_is_missing_in_which_lines_were_due_they_are_measured_in_the_next_one():
-    moments = followed({2: None, 3: frame(3)}, every=2)
-    assert how(moments)[:8] == ["measured", "coasted", "coasted", "measured", *2 * ["coasted", "measured"]]
+    moments = followed({2: None, 3: frame(3)}, every=2, count=8)
+    assert how(moments) == ["measured", "coasted", "coasted", "measured", *2 * ["coasted", "measured"]]
 
 
 @pytest.mark.long
@@ -156,19 +156,19 @@ def test_who_looks_ahead_bridges_a_short_gap():
 
 
 def test_a_frame_that_shows_no_lines_is_coasted_over():
-    moments = followed({15: np.full_like(still_picture(), 90)})
+    moments = followed({15: np.full_like(still_picture(), 90)}, count=17)
     assert how(moments)[14:17] == ["measured", "coasted", "measured"]
 
 
 def test_a_frame_of_something_else_is_coasted_over():
-    moments = followed({15: np.roll(frame(15), 40, axis=0)})
+    moments = followed({15: np.roll(frame(15), 40, axis=0)}, count=20)
     assert how(moments)[14:17] == ["measured", "coasted", "measured"]
     assert residual_px(moments) < 0.15
 
 
 def test_a_frame_that_cannot_be_is_refused():
     elsewhere = np.roll(frame(15), (1, 2), axis=(0, 1))
-    moments = followed({15: elsewhere})
+    moments = followed({15: elsewhere}, count=20)
     assert how(moments)[14:17] == ["measured", "refused", "measured"]
     assert residual_px(moments) < 0.15
 
@@ -183,15 +183,15 @@ def magnified(picture: np.ndarray, by: float) -> np.ndarray:
 @pytest.mark.parametrize("by", try_first([1.02, 1.01]))
 def test_a_lens_that_is_zoomed_is_refused_however_long_it_is_looked_at(by):
     """A pose that nobody knows any more must not be drawn to where a part of the lines fits it."""
-    moments = followed({number: magnified(frame(number), by) for number in range(12, COUNT)})
+    moments = followed({number: magnified(frame(number), by) for number in range(12, 24)}, count=24)
     assert "measured" not in how(moments)[12:]
 
 
 def test_a_picture_that_is_noisier_or_less_sharp_than_usual_is_measured():
     rng = np.random.default_rng(3)
-    noisy = {number: with_noise(frame(number), rng, 15) for number in range(12, 20)}
-    soft = {number: cv2.GaussianBlur(frame(number), (0, 0), 1.0) for number in range(24, 32)}
-    moments = followed(noisy | soft)
+    noisy = {number: with_noise(frame(number), rng, 15) for number in range(12, 16)}
+    soft = {number: cv2.GaussianBlur(frame(number), (0, 0), 1.0) for number in range(18, 22)}
+    moments = followed(noisy | soft, count=24)
     assert set(how(moments)) == {"measured"}
     assert residual_px(moments) < 0.15
 
