@@ -1,7 +1,5 @@
 """HTTP application: checks, stores, queues and answers. It computes nothing."""
 
-from __future__ import annotations
-
 import asyncio
 import errno
 from collections.abc import AsyncIterator, Sequence

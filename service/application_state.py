@@ -1,7 +1,5 @@
 """State of a service: database, blob store, queue, intake of frames."""
 
-from __future__ import annotations
-
 from service import queue
 from service.intake.from_sources import FromSources
 from service.intake.snapshots import Snapshots

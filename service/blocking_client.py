@@ -7,8 +7,6 @@ class Client:
     venue_events = blocking_stream(AsyncClient.venue_events)
 """
 
-from __future__ import annotations
-
 from collections.abc import AsyncGenerator, Awaitable, Callable, Coroutine, Iterator
 from functools import wraps
 from typing import Any, Concatenate, ParamSpec, TypeVar

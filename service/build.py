@@ -1,7 +1,5 @@
 """Version and commit of this program, and commands that install its extras."""
 
-from __future__ import annotations
-
 import shlex
 import subprocess
 from functools import cache

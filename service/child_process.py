@@ -1,7 +1,5 @@
 """Child processes, which end with their parent; those that decode uploads get no secrets."""
 
-from __future__ import annotations
-
 import ctypes
 import os
 import signal

@@ -14,8 +14,6 @@ Both have the same methods. A service that refuses raises `Refused`. Fields and 
 client does not know are left out, and words that it does not know are handed on as they are.
 """
 
-from __future__ import annotations
-
 import asyncio
 import json
 import math

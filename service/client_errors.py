@@ -1,7 +1,5 @@
 """Errors of the client, and when to ask again."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

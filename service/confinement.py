@@ -4,8 +4,6 @@ The programs that decode what strangers sent run as the user of the API and the 
 environment and the memory of another one of its user, and there are the secrets. Each half closes that by itself.
 """
 
-from __future__ import annotations
-
 import ctypes
 import os
 import struct

@@ -6,8 +6,6 @@ the exponentially weighted moving average (EWMA), which shows where the mean is 
 caller's.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -45,7 +43,7 @@ class Baseline:
     unsure: float = 0.0
 
     @classmethod
-    def of(cls, nights: Sequence[Night]) -> Baseline:
+    def of(cls, nights: Sequence[Night]) -> "Baseline":
         """Estimate the baseline from the first nights, robust against outliers."""
         first = nights[:NIGHTS_OF_BASELINE]
         values = [night.value for night in first]
@@ -63,12 +61,11 @@ class Baseline:
 class ChartPoint:
     """State of both charts after a night, in standard deviations from the centre.
 
-    `standardised`: the value itself; `limit`: limit of the EWMA, which widens from night to night; `high` and `low`:
-    the CUSUM's upward and downward sums, 0 or more; `since`: index of the night since which the larger sum has been
-    above 0, the estimated beginning of the shift; None while both are 0.
+    `limit`: limit of the EWMA, which widens from night to night; `high` and `low`: the CUSUM's upward and downward
+    sums, 0 or more; `since`: index of the night since which the larger sum has been above 0, the estimated beginning of
+    the shift; None while both are 0.
     """
 
-    standardised: float
     ewma: float
     limit: float
     high: float
@@ -100,13 +97,14 @@ def charted(nights: Iterable[Night | None], baseline: Baseline) -> Iterator[Char
             yield None
             continue
         measured += 1
-        standardised = (night.value - baseline.centre) / _above_zero(baseline.spread(night))
+        # A series without any spread would divide by zero.
+        standardised = (night.value - baseline.centre) / max(baseline.spread(night), 1e-12)
         ewma += WEIGHT * (standardised - ewma)
         high_since, low_since = number if high == 0 else high_since, number if low == 0 else low_since
         slack = SLACK_SIGMA + baseline.unsure
         high, low = max(0.0, high + standardised - slack), max(0.0, low - standardised - slack)
         since = None if high == low == 0 else high_since if high >= low else low_since
-        yield ChartPoint(standardised, ewma, ewma_limit(measured, baseline.unsure), high, low, since)
+        yield ChartPoint(ewma, ewma_limit(measured, baseline.unsure), high, low, since)
 
 
 def ewma_limit(nights: int, unsure: float = 0.0) -> float:
@@ -123,8 +121,3 @@ def hodges_lehmann(values: Sequence[float]) -> float:
     Hodges and Lehmann, "Estimates of Location Based on Rank Tests", 1963.
     """
     return median((a + b) / 2 for a, b in combinations_with_replacement(values, 2))
-
-
-def _above_zero(spread: float) -> float:
-    # A series without any spread would divide by zero.
-    return max(spread, 1e-12)

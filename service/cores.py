@@ -3,8 +3,6 @@
 A container that may use two of 64 cores and starts 64 threads has each of them throttled most of the time.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 from pathlib import Path, PurePosixPath

@@ -6,8 +6,6 @@ then it is given up. Kinds with a queue of their own neither wait for the others
 know how a job ended; the job's row does.
 """
 
-from __future__ import annotations
-
 import sqlite3
 import threading
 import uuid

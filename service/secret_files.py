@@ -3,8 +3,6 @@
 `NAME_FILE` names the file of the secret `NAME`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Literal

@@ -1,7 +1,5 @@
 """API server of this process, and the worker process of `esc up`."""
 
-from __future__ import annotations
-
 import asyncio
 import errno
 import os

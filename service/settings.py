@@ -1,7 +1,5 @@
 """Every setting: environment variables `ESC_...`, or a `.env` file."""
 
-from __future__ import annotations
-
 import base64
 import binascii
 import ipaddress

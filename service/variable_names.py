@@ -1,7 +1,5 @@
 """Detection of misspelt environment variables `ESC_...`."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable
 from difflib import get_close_matches
 

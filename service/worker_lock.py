@@ -1,7 +1,5 @@
 """Lock by which only one worker of a name runs on a folder."""
 
-from __future__ import annotations
-
 import fcntl
 import hashlib
 import time

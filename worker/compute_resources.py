@@ -3,8 +3,6 @@
 It has no models: the program that computes a job begins without them.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
@@ -34,6 +32,6 @@ class ComputeResources:
     software: str = field(default_factory=_installed_release)
 
     @classmethod
-    def of(cls, settings: Settings) -> ComputeResources:
+    def of(cls, settings: "Settings") -> "ComputeResources":
         """Return the resources of the settings, with an absolute path of the model."""
         return cls(settings.model.absolute(), settings.threads, settings.provider)

@@ -3,8 +3,6 @@
 No other worker may have the name at the same time.
 """
 
-from __future__ import annotations
-
 import hashlib
 import time
 import uuid

@@ -1,7 +1,5 @@
 """Files of jobs in the blob store: reads frames, writes pictures."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import structlog

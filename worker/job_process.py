@@ -3,8 +3,6 @@
 The program decodes files that strangers sent. So it gets the task and the files, and no access to database or store.
 """
 
-from __future__ import annotations
-
 import os
 import selectors
 import signal
@@ -56,7 +54,7 @@ class JobProcess:
         assert self._process.stdout is not None
         self._output: IO[bytes] = self._process.stdout
 
-    def __enter__(self) -> JobProcess:
+    def __enter__(self) -> "JobProcess":
         return self
 
     def __exit__(self, *_: object) -> None:

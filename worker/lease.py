@@ -9,8 +9,6 @@ One transaction asks about all jobs of the worker, however many run at once. The
 have something new to say, and now and then renews all leases.
 """
 
-from __future__ import annotations
-
 import threading
 import time
 
@@ -52,7 +50,7 @@ class Leases:
         self._lost: set[str] = set()
         self._asked_at = self._renewed_at = float("-inf")
 
-    def begin(self, task: Task, limit_s: float) -> Lease:
+    def begin(self, task: Task, limit_s: float) -> "Lease":
         """Return the lease of an attempt, for a `with` block; `limit_s`: the time limit of the job."""
         return Lease(self, task, limit_s)
 
@@ -105,7 +103,7 @@ class Lease:
         self._deadline = time.monotonic() + limit_s
         self._reported_at, self._stage = float("-inf"), ""
 
-    def __enter__(self) -> Lease:
+    def __enter__(self) -> "Lease":
         self._leases.add(self._task)
         return self
 

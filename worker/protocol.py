@@ -7,8 +7,6 @@ These are the worker's models of it, which check what comes out of a program. Th
 JSON, see `worker.jobs.program`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import IO, Any, assert_never
 
@@ -35,7 +33,7 @@ class JobRequest(BaseModel):
     sizes: dict[str, list[int]]
 
     @classmethod
-    def of(cls, task: Task, means: ComputeResources, files: Files) -> JobRequest:
+    def of(cls, task: Task, means: ComputeResources, files: Files) -> "JobRequest":
         """Return the request for a task, without the addresses that its program does not need."""
         sizes = {name: [len(file) for file in several] for name, several in files.items()}
         return cls(task=task.without_addresses(), means=means, sizes=sizes)
@@ -99,7 +97,7 @@ class Message(BaseModel):
         """True if no other message follows."""
         return self.result is not None or self.error is not None
 
-    def without_pictures(self, why: str) -> Message:
+    def without_pictures(self, why: str) -> "Message":
         """Return the message whose result says that the pictures that came with it are missing."""
         if self.result is None:
             return self

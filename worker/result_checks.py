@@ -4,8 +4,6 @@ The models of the protocol say what each number is, not that it can be: a progra
 alone, at once and in words, and leave nothing that nobody can read or send back.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from typing import Any

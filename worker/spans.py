@@ -1,7 +1,5 @@
 """OpenTelemetry spans of an attempt and its stages."""
 
-from __future__ import annotations
-
 from contextlib import ExitStack
 from types import TracebackType
 from typing import Self

@@ -6,8 +6,6 @@ its heartbeat silent. Stopped politely, it takes no more jobs, lets those that r
 end in time: nothing is counted against them.
 """
 
-from __future__ import annotations
-
 import os
 import signal
 import threading

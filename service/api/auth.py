@@ -10,8 +10,6 @@ answered then (a long poll, a stream of events) is answered to its end. Reading 
 written down once a minute.
 """
 
-from __future__ import annotations
-
 import asyncio
 import hashlib
 import hmac

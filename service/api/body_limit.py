@@ -5,8 +5,6 @@ waits: it may have a megabyte, which is more than a document needs. FastAPI's ow
 Content-Length in plain text, around every handler.
 """
 
-from __future__ import annotations
-
 from http import HTTPStatus
 
 from starlette.datastructures import Headers

@@ -1,7 +1,5 @@
 """Waiting for changes of jobs and venues: one small query each, a few times a second, for all clients that wait."""
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager, suppress

@@ -1,7 +1,5 @@
 """Context of the routes: built once per process, handed to each request."""
 
-from __future__ import annotations
-
 import re
 from typing import Annotated, cast
 

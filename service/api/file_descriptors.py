@@ -1,7 +1,5 @@
 """Limit of connected clients, from the open files that a process may have."""
 
-from __future__ import annotations
-
 import resource
 
 import structlog

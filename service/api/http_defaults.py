@@ -1,7 +1,5 @@
 """HEAD for every address (RFC 9110, section 9.3.2), and headers that keep browsers from guessing types."""
 
-from __future__ import annotations
-
 from starlette.datastructures import MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 

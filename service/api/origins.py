@@ -6,8 +6,6 @@ and, where a request can change something, the origin of the page that asks (`Or
 address in place of a name cannot be made to point elsewhere.
 """
 
-from __future__ import annotations
-
 from urllib.parse import SplitResult, urlsplit
 
 from starlette.requests import HTTPConnection

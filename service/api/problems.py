@@ -1,7 +1,5 @@
 """Error handlers: every error of the application becomes a problem (RFC 9457)."""
 
-from __future__ import annotations
-
 import json
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Rate limits: token buckets in the memory of one process."""
 
-from __future__ import annotations
-
 import heapq
 import time
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Id, log line and metrics of every request."""
 
-from __future__ import annotations
-
 import re
 import time
 import uuid

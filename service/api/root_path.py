@@ -4,8 +4,6 @@ The routes do not know the path. Addresses in JSON are relative to the address o
 are the same for every process and in every webhook, and are appended to the URL that a client was given.
 """
 
-from __future__ import annotations
-
 import re
 from urllib.parse import urlsplit, urlunsplit
 

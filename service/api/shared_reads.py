@@ -4,8 +4,6 @@ A production tool polls one job from many places. Each answer shows the job as i
 that has begun is not shared with anybody who comes later: they share the next one.
 """
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import Callable
 

@@ -7,8 +7,6 @@ once a second and closes those over the limit, with an answer where that is stil
 this.
 """
 
-from __future__ import annotations
-
 import asyncio
 import socket
 from collections import OrderedDict
@@ -41,7 +39,7 @@ class ConnectionLimiter:
         self._connected: OrderedDict[Connection, None] = OrderedDict()
         self._logged_at = -LOGGED_EVERY_S
 
-    def admit(self, connection: Connection, now: float) -> bool:
+    def admit(self, connection: "Connection", now: float) -> bool:
         """Admit a client if there is room or can be made; False if not."""
         if len(self._connected) >= self._most:
             if now - self._logged_at >= LOGGED_EVERY_S:
@@ -52,12 +50,12 @@ class ConnectionLimiter:
         self._connected[connection] = None
         return True
 
-    def touch(self, connection: Connection) -> None:
+    def touch(self, connection: "Connection") -> None:
         """Note that a client has sent something."""
         if connection in self._connected:
             self._connected.move_to_end(connection)
 
-    def remove(self, connection: Connection) -> None:
+    def remove(self, connection: "Connection") -> None:
         """Forget a client that is gone."""
         self._connected.pop(connection, None)
 

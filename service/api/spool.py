@@ -5,8 +5,6 @@ just below that size is hundreds of megabytes, and one of 150 larger ones is 150
 after the other, so that each is a part of one file.
 """
 
-from __future__ import annotations
-
 import io
 import tempfile
 from typing import BinaryIO, Self, cast

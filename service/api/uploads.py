@@ -1,7 +1,5 @@
 """Limits of the number and size of uploads that arrive at once, on the disk and in memory."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager

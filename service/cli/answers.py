@@ -1,7 +1,5 @@
 """Answers of commands: JSON for programs, lines for people at a terminal, and the outcome of a job in words."""
 
-from __future__ import annotations
-
 import json
 import sys
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """Arguments and options that several commands share, and how their values are parsed."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

@@ -1,13 +1,10 @@
 """`esc calibrate` and `snapshot`: poses and frames by a service."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from service.cli.answers import job_exit_code, print_answer, print_submitted
 from service.cli.arguments import (
     DEFAULT_URL,
     AnswerAsJson,
@@ -21,7 +18,7 @@ from service.cli.arguments import (
     parse_frame_files,
     parse_options,
 )
-from service.cli.progress import follow_to_end
+from service.cli.progress import end_with_job
 from service.cli.service_client import open_client
 from service.schemas.file_kinds import PNG_START
 
@@ -50,12 +47,7 @@ def calibrate(
     files, job_options = parse_frame_files(frames or []), parse_options(options)
     with open_client(url, api_key) as client:
         job = client.calibrate(venue, files, job_options.model_dump(mode="json", exclude_unset=True), key)
-        if not wait:
-            print_submitted(client, job, as_json=as_json)
-            return
-        job = follow_to_end(client, job)
-    print_answer(job, as_json=as_json)
-    raise typer.Exit(job_exit_code(job))
+        end_with_job(client, job, wait=wait, as_json=as_json)
 
 
 def snapshot(

@@ -1,7 +1,5 @@
 """`esc check`: is a calibration, whoever made it, still good on this picture? Without a venue and a service."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from pathlib import Path
@@ -83,7 +81,6 @@ def check(
 
 
 def _parse_field(sport: str | None, size: str | None, site: Path) -> FieldOfPlay:
-    """Return the field of a sport, or of a file with a field."""
     if sport is None:
         described = _field_of(site)
         if described is None or size is not None:

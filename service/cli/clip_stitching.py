@@ -3,8 +3,6 @@
 Imports the engine, see `local_engine`.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from contextlib import ExitStack

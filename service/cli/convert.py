@@ -1,7 +1,5 @@
 """`esc convert`: a calibration in the format of another tool."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Address and key of the service in a file `.env`."""
 
-from __future__ import annotations
-
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 

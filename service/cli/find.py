@@ -1,7 +1,5 @@
 """`esc find`: cameras from nothing but their frames and the field, without a service."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """`esc home`: copies of the database and the files of a service."""
 
-from __future__ import annotations
-
 import signal
 import sys
 from collections.abc import Callable, Iterator
@@ -82,7 +80,8 @@ def copy_home(
     counts = [(table, str(count)) for table, count in rows.items()]
     print_rows(["TABLE", "ROWS"], [*counts, ("files", "they stay" if files is None else str(files))])
     print_note("Start the service with what its settings now must say:")
-    print_note(f"  ESC_DATABASE_URL={_without_password(there.database)}\n  ESC_BLOB_URL={blobs_there}")
+    database = sa.make_url(there.database).render_as_string(hide_password=True)
+    print_note(f"  ESC_DATABASE_URL={database}\n  ESC_BLOB_URL={blobs_there}")
 
 
 @contextmanager
@@ -192,8 +191,3 @@ def _parse_location(text: str, blobs: str | None) -> ServiceLocation:
         fail("Expected is a folder, postgresql://user:password@host:5432/name or sqlite:////folder/esc.sqlite.", USAGE)
     folder = Settings.model_construct(data=Path(text), database_url=None, blob_url=blobs)
     return ServiceLocation(folder.home_database_url, folder.home_blob_url)
-
-
-def _without_password(url: str) -> str:
-    """Return the URL of a database without its password."""
-    return sa.make_url(url).render_as_string(hide_password=True)

@@ -1,13 +1,11 @@
 """`esc job`: jobs of a service."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from service.cli.answers import job_exit_code, outcome_text, print_answer, print_json, print_submitted
+from service.cli.answers import outcome_text, print_answer, print_json
 from service.cli.arguments import (
     DEFAULT_URL,
     AnswerAsJson,
@@ -23,10 +21,9 @@ from service.cli.arguments import (
     require_yes,
 )
 from service.cli.printing import FAILED, fail, print_rows, write_document
-from service.cli.progress import follow_to_end
+from service.cli.progress import end_with_job
 from service.cli.service_client import open_client
-from service.client import Client
-from service.schemas.job import Job, Jobs
+from service.schemas.job import Jobs
 from service.schemas.names import JobKind, JobStatus
 from service.store.jobs.files import picture_file
 
@@ -70,7 +67,7 @@ def get_job(job: JobId, as_json: AnswerAsJson = False, url: Url = DEFAULT_URL, a
 def wait_for_job(job: JobId, as_json: AnswerAsJson = False, url: Url = DEFAULT_URL, api_key: ApiKey = None) -> None:
     """Follow a job to its end and print it. Exit: 0 accepted, 1 failed or cancelled, 3 rejected, 75 busy."""
     with open_client(url, api_key) as client:
-        _follow_and_exit(client, client.job(job), as_json=as_json)
+        end_with_job(client, client.job(job), wait=True, as_json=as_json)
 
 
 @app.command("again")
@@ -85,11 +82,7 @@ def submit_again(
 ) -> None:
     """Compute the frames of a job once more, with its options, from the poses in use: a new job."""
     with open_client(url, api_key) as client:
-        new = client.again(job)
-        if wait:
-            _follow_and_exit(client, new, as_json=as_json)
-        else:
-            print_submitted(client, new, as_json=as_json)
+        end_with_job(client, client.again(job), wait=wait, as_json=as_json)
 
 
 @app.command("picture")
@@ -168,9 +161,3 @@ def delete_job(job: JobId, yes: Yes = False, url: Url = DEFAULT_URL, api_key: Ap
     require_yes(yes, f"Forget job {job}, its frames and its pictures")
     with open_client(url, api_key) as client:
         client.delete_job(job)
-
-
-def _follow_and_exit(client: Client, job: Job, *, as_json: bool) -> None:
-    job = follow_to_end(client, job)
-    print_answer(job, as_json=as_json)
-    raise typer.Exit(job_exit_code(job))

@@ -1,7 +1,5 @@
 """`esc key`: API keys of a service on this machine."""
 
-from __future__ import annotations
-
 import os
 import re
 from collections.abc import Iterator

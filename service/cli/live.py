@@ -1,7 +1,5 @@
 """`esc live`: the poses of a venue, sent to renderers on the network at the rate of their pictures."""
 
-from __future__ import annotations
-
 import ipaddress
 import re
 import signal

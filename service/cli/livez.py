@@ -4,8 +4,6 @@ Not a command of `esc`: only a container asks itself. `--host` and `--port` of t
 here, ESC_HOST and ESC_PORT are.
 """
 
-from __future__ import annotations
-
 import ipaddress
 import sys
 from http import HTTPStatus

@@ -1,7 +1,5 @@
 """The database and the folders of a service on this machine: checks before they are used."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager

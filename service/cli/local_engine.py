@@ -3,8 +3,6 @@
 NumPy and OpenCV read the environment when they are loaded: such a command imports the engine after `engine_settings()`.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager

@@ -3,8 +3,6 @@
 The module of a command is imported when it runs: help is printed in a third of the time that the server takes to load.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 from importlib import import_module

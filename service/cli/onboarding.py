@@ -1,7 +1,5 @@
 """`esc intrinsics`, `pose` and `field fit`: lenses, first poses and the field before the first calibration."""
 
-from __future__ import annotations
-
 import json
 import re
 import secrets
@@ -234,8 +232,7 @@ def fit_field(
     print_answer(result, as_json=as_json)
     if not result.accepted:
         raise typer.Exit(REJECTED)
-    fitted = stored.with_poses({camera.id: camera.pose for camera in result.cameras})
-    fitted = fitted.model_copy(update={"field": result.field})
+    fitted = stored.with_cameras({camera.id: {"pose": camera.pose} for camera in result.cameras}, field=result.field)
     output.write_text(fitted.to_input().model_dump_json(indent=2, exclude_none=True) + "\n")
 
 

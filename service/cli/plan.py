@@ -1,7 +1,5 @@
 """`esc plan`: what a calibration of cameras would be like that are not mounted yet."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 from typing import Annotated

@@ -1,7 +1,5 @@
 """Lines that commands print, and the exit codes that they end with."""
 
-from __future__ import annotations
-
 import json
 import sys
 from collections.abc import Iterable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """`esc run`: the calibration of a venue's file, without a service."""
 
-from __future__ import annotations
-
 import secrets
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """`esc up` and `serve`: a service, or its API alone."""
 
-from __future__ import annotations
-
 from service import confinement, serving
 from service.cli.arguments import Data, Host, Port
 from service.cli.local_database import report_database_errors, require_folders, require_local_database

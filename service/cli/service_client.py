@@ -1,7 +1,5 @@
 """The client that commands call a service with; exit with a line where it refuses or cannot be reached."""
 
-from __future__ import annotations
-
 import os
 import re
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """The settings of a service on this machine, as commands load them."""
 
-from __future__ import annotations
-
 import os
 from typing import Any
 

@@ -1,7 +1,5 @@
 """`esc stitch`: clips of a venue's cameras become one clip of the stitched view, on this machine."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Annotated, Any

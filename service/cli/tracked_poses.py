@@ -3,8 +3,6 @@
 Imports the engine, see `local_engine`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from fractions import Fraction

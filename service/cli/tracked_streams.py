@@ -1,7 +1,5 @@
 """Cameras that `esc live` tracks in their streams, and the poses that it sends of them."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -33,7 +31,7 @@ class TrackedStreams:
     venue: Venue
     sender: PoseSender
     sent: Callable[[SentPose], None]
-    cameras: dict[str, StreamTracker] = field(default_factory=dict, init=False)
+    cameras: "dict[str, StreamTracker]" = field(default_factory=dict, init=False)
     _last_s: dict[str, float] = field(default_factory=dict, init=False)
     _trouble: dict[str, OngoingTrouble] = field(default_factory=dict, init=False)
 
@@ -118,7 +116,7 @@ class TrackedStreams:
             frames[name] = encode_jpeg(frame, FRAME_QUALITY)
         return frames
 
-    def _report(self, pose: LivePose) -> None:
+    def _report(self, pose: "LivePose") -> None:
         from service.cli.tracked_poses import camera_document
 
         tracked = pose.tracked

@@ -1,7 +1,5 @@
 """Changes of a venue by hand: losses by a file, patches of PART=VALUE, and an editor."""
 
-from __future__ import annotations
-
 import json
 import math
 import os
@@ -65,20 +63,13 @@ def _lost_settings(venue: Venue, stored: Venue) -> list[str]:
 def with_poses_of(venue: VenueIn, stored: Venue) -> VenueIn:
     """Return a venue with the poses of the stored one, and the lenses and the ridge that they belong to."""
     # Validated as input: rotation and position both stay as they are, to the last digit.
-    known = {camera.id: camera for camera in VenueIn.model_validate(stored.model_dump()).cameras}
-    cameras = [
-        camera.model_copy(
-            update={
-                "pose": known[camera.id].pose,
-                "intrinsics": known[camera.id].intrinsics.with_sigma_of(camera.intrinsics),
-            }
-        )
-        if camera.id in known
-        else camera
-        for camera in venue.cameras
-    ]
-    field = venue.field.model_copy(update={"ridge": stored.field.ridge})
-    return venue.model_copy(update={"cameras": cameras, "field": field})
+    given = {camera.id: camera.intrinsics for camera in venue.cameras}
+    known = {
+        camera.id: {"pose": camera.pose, "intrinsics": camera.intrinsics.with_sigma_of(given[camera.id])}
+        for camera in VenueIn.model_validate(stored.model_dump()).cameras
+        if camera.id in given
+    }
+    return venue.with_cameras(known, field=venue.field.model_copy(update={"ridge": stored.field.ridge}))
 
 
 def parse_patch(changes: Sequence[str]) -> dict[str, Any]:

@@ -1,7 +1,5 @@
 """`esc venue find` and `adopt`: cameras found by their frames, and what jobs have found, stored in a venue."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path

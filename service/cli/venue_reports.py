@@ -1,7 +1,5 @@
 """`esc venue history`, `trend`, `health` and `follow`: reports of a venue."""
 
-from __future__ import annotations
-
 from datetime import date
 from typing import Annotated
 

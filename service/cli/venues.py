@@ -1,7 +1,5 @@
 """`esc venue`: venues of a service."""
 
-from __future__ import annotations
-
 import json
 import zipfile
 from http import HTTPStatus

@@ -1,7 +1,5 @@
 """`esc worker`: what computes the jobs of a service."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 import typer

@@ -4,8 +4,6 @@ Camera and lens are OpenCV's (`fisheye`: `cv2.fisheye`); rotation, a Rodrigues v
 translation take the world to the camera. Cameras have numbers and no names; the world is that of the board, in metres.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from typing import Any

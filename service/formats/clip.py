@@ -1,7 +1,5 @@
 """The poses of a clip, frame by frame, as files beside its video: OpenTrackIO samples, FreeD packets and a table."""
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Sequence
 from contextlib import ExitStack

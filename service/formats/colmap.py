@@ -5,8 +5,6 @@ are whatever the model was aligned to. Written are OPENCV where it is exact, els
 models are read but those without a counterpart (FOV, THIN_PRISM_FISHEYE and newer ones).
 """
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Callable, Iterator, Sequence
 

@@ -3,8 +3,6 @@
 Losses are not listed by format: what was written is read again, and compared.
 """
 
-from __future__ import annotations
-
 import io
 import math
 import zipfile

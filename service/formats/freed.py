@@ -9,8 +9,6 @@ Pan is positive to the right, tilt upwards, roll clockwise from behind; a camera
 Vendors differ in that: `axes` says what goes where.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Mapping, Sequence

@@ -5,8 +5,6 @@ of the first camera in the world is in no camchain: it is read as the world, unl
 takes the IMU to the camera. Lenses: `pinhole` with `radtan` (k1, k2, p1, p2) or `equidistant` (`cv2.fisheye`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from service.formats.lens import NumberedCamera

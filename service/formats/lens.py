@@ -1,16 +1,14 @@
 """A camera as the formats take it: its numbers by name, and a check that a format can hold its lens."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from dataclasses import dataclass
 
 from service.formats.rotations import Matrix, matrix_of
+from service.schemas.geometry import COEFFICIENTS as COEFFICIENTS_BY_MODEL
 from service.schemas.geometry import Pose, PosedCamera, UnposedCamera
 from service.schemas.problems import Problem
 
-# OpenCV's order.
-COEFFICIENTS = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4", "tau_x", "tau_y")
+COEFFICIENTS = COEFFICIENTS_BY_MODEL["opencv"]
 RADIAL = ("k1", "k2", "k3", "k4", "k5", "k6")
 TANGENTIAL = ("p1", "p2")
 THIN_PRISM = ("s1", "s2", "s3", "s4")

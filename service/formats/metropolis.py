@@ -14,8 +14,6 @@ in the calibrations that come with VSS pixels to the ground. Readers that miss i
 and `globalCoordinates`.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Iterator, Sequence

@@ -5,8 +5,6 @@ splined models have no counterpart. `extrinsics`, also called `rt_cam_ref`, take
 Rodrigues vector and a translation in metres. Pixel centres are at integers.
 """
 
-from __future__ import annotations
-
 from service.formats.lens import COEFFICIENTS, NumberedCamera
 from service.formats.parsing import ParsedFile
 from service.formats.records import CameraRecord, camera_matrix, lens_of, stem_of

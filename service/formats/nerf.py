@@ -5,8 +5,6 @@ centres are at 0.5. Numbers of the lens stand at the top, or in a frame where th
 of OpenCV, or k1 to k4 of `cv2.fisheye` with `camera_model` OPENCV_FISHEYE (nerfstudio) or `is_fisheye` (instant-ngp).
 """
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Sequence

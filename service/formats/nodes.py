@@ -1,7 +1,5 @@
 """Values of a parsed file with their places in it, so that a wrong one is refused with place, expectation and value."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -34,7 +32,7 @@ class Node:
     def __contains__(self, key: str) -> bool:
         return isinstance(self.value, dict) and self.value.get(key) is not None
 
-    def __getitem__(self, key: str) -> Node:
+    def __getitem__(self, key: str) -> "Node":
         """Return a member of a mapping; refuse a value that has none of that name."""
         if not isinstance(self.value, dict):
             self.refuse(f"a mapping with {key}")
@@ -42,7 +40,7 @@ class Node:
             raise FileRefusedError(self.file, self.place, f"a member {key}", _shown(list(self.value)))
         return self._below(key)
 
-    def get(self, key: str) -> Node | None:
+    def get(self, key: str) -> "Node | None":
         """Return a member of a mapping, or None where it is absent or null."""
         return self._below(key) if key in self else None
 
@@ -50,14 +48,14 @@ class Node:
         """True, whatever the value: a node is there or None."""
         return True
 
-    def members(self) -> Iterator[tuple[str, Node]]:
+    def members(self) -> "Iterator[tuple[str, Node]]":
         """Yield the names and values of a mapping."""
         if not isinstance(self.value, dict):
             self.refuse("a mapping")
         for key in self.value:
             yield str(key), self._below(key)
 
-    def elements(self, least: int = 1) -> list[Node]:
+    def elements(self, least: int = 1) -> "list[Node]":
         """Return the elements of a list of at least so many."""
         if not isinstance(self.value, list) or len(self.value) < least:
             self.refuse(f"a list of {least} or more")
@@ -108,7 +106,7 @@ class Node:
             self.refuse(f"a matrix of {rows}x{columns} numbers")
         return [row.numbers(columns) for row in self.elements()]
 
-    def _below(self, key: str) -> Node:
+    def _below(self, key: str) -> "Node":
         return Node(self.file, f"{self.place}.{key}" if self.place else str(key), self.value[key])
 
 

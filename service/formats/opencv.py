@@ -5,8 +5,6 @@ XML and JSON, under the names that OpenCV's own samples and most of its users gi
 `fisheye_model: 1`, as the samples write it. `rvec` and `tvec` (or a matrix R and T) take the world to the camera.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from service.formats.lens import COEFFICIENTS, NumberedCamera

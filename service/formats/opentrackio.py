@@ -7,8 +7,6 @@ calibration knows no millimetres, and only ratios to the sensor's size reach a p
 pixel (W/2, H/2), as in SMPTE's "Conversion of OpenCV to OpenTrackIO" (corrected 2025-09-02).
 """
 
-from __future__ import annotations
-
 import json
 import math
 import uuid

@@ -4,8 +4,6 @@ No parser here builds objects: YAML is built from its events without tags and al
 Python literal is no program. Size and depth are limited before anything is built.
 """
 
-from __future__ import annotations
-
 import ast
 import io
 import json

@@ -4,8 +4,6 @@ Also read: a venue's file, of which the cameras count. A single lens without a p
 and `esc pose` takes it.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 

@@ -4,8 +4,6 @@ Their camera is OpenCV's (`cv2.projectPoints`), their world is metres with z up,
 Pose2Sim does not read it: a fisheye lens is refused. Files that have it, of anipose, are read.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """Calibration files of any format that is read: recognised by their content, and their cameras in ESC's convention."""
 
-from __future__ import annotations
-
 import io
 import zipfile
 from collections.abc import Mapping, Sequence

@@ -3,8 +3,6 @@
 Axes and coefficients are OpenCV's, poses go from the world to the camera, pixel centres are at integers.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import PurePath

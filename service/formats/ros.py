@@ -5,8 +5,6 @@ centres are at integers. The camera is monocular: its rectification is the ident
 `sensor_msgs/CameraInfo` (`D`, `K`, or `d`, `k` of ROS 2) are read too.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from service.formats.lens import RADIAL, TANGENTIAL, NumberedCamera

@@ -1,7 +1,5 @@
 """Rotations as files write them: Rodrigues vectors, matrices and quaternions. Radians; without NumPy."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -5,8 +5,6 @@ tilt 0 a camera looks straight down. Readers take the picture to be twice as lar
 read, where that is a whole number of pixels. `cam_params` around the parameters, as other tools write it, is read too.
 """
 
-from __future__ import annotations
-
 import json
 import math
 

@@ -1,7 +1,5 @@
 """ST maps of one camera's lens: two EXR files in a zip, computed by a program of the worker's, not by the service."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Mapping, Sequence
 from typing import Literal

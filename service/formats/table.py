@@ -1,7 +1,5 @@
 """The formats, by the names that callers use: the one table of what is written and what is read."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -53,7 +51,7 @@ class Reader:
     read: Callable[[Sequence[ParsedFile]], list[CameraRecord]]
 
     @classmethod
-    def of(cls, recognises: Callable[[ParsedFile], bool], read: Callable[[ParsedFile], list[CameraRecord]]) -> Reader:
+    def of(cls, recognises: Callable[[ParsedFile], bool], read: Callable[[ParsedFile], list[CameraRecord]]) -> "Reader":
         """Return the reader of a format each of whose files stands by itself."""
         return cls(recognises, lambda files: [camera for file in files for camera in read(file)])
 
@@ -120,7 +118,7 @@ FILE_FORMATS: Mapping[FormatName, Format] = {
 }
 
 
-def export_formats(settings: Settings) -> Mapping[FormatName, Format]:
+def export_formats(settings: "Settings") -> Mapping[FormatName, Format]:
     """Return every format by its name, with those that depend on the settings and are written alone."""
     # What runs programs takes longer to load than all that the command line needs of formats.
     from service.formats import stmap

@@ -1,7 +1,5 @@
 """Calibrations whose frames the service fetches from the sources of the cameras."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
 
@@ -16,7 +14,6 @@ from service.store.blobs import Blobs
 from service.store.ids import new_id
 from service.store.jobs.submission import Submission, SubmissionRepository, fetched_hash
 from service.store.jobs.task import Origin, seeded
-from service.store.refusals import no_such_venue
 from service.store.venues import VenueRepository
 
 
@@ -59,10 +56,7 @@ class FromSources:
         if known is not None:
             return known, False
         self._intake.require_place(origin)
-        found = self._venues.with_credentials(venue_id)
-        if found is None:
-            raise no_such_venue(venue_id)
-        venue, credentials = found
+        venue, credentials = self._venues.with_credentials(venue_id)
         taken = self._snapshots.take_of_all(venue.cameras, credentials, frames, spacing_s, within_s)
         fetched()
         hashes = {camera: [hashlib.sha256(frame).hexdigest() for frame in several] for camera, several in taken.items()}

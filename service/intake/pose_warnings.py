@@ -7,8 +7,6 @@ and near the field, and sees most of its markings. OpenCV takes its time to load
 was put.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Iterator, Sequence

@@ -1,7 +1,5 @@
 """Frames from the sources of cameras, fetched by a program of the worker's: one that hangs is ended with it."""
 
-from __future__ import annotations
-
 import subprocess
 import tempfile
 import threading
@@ -14,8 +12,7 @@ from pydantic import ValidationError
 from service import child_process
 from service.intake import image_checks
 from service.schemas.problems import Problem
-from service.schemas.programs.fetching import SourceFetch
-from service.schemas.programs.sources import SourceAnswer, SourceTask, frame_file, longest_s
+from service.schemas.programs.sources import SourceAnswer, SourceFetch, SourceTask, frame_file, longest_s
 from service.schemas.source_urls import SourceSecrets
 from service.schemas.venue import Camera
 from service.settings import Settings

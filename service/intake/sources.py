@@ -1,7 +1,5 @@
 """Check of the sources of cameras against the hosts that `ESC_SOURCES` allows."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from urllib.parse import urlsplit
 

@@ -1,7 +1,5 @@
 """Intake of submissions: their frames are stored, and become a job unless they are one already."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from datetime import timedelta

@@ -1,7 +1,5 @@
 """Destinations of live poses: datagrams to a renderer or a multicast group, and lines of JSON for programs."""
 
-from __future__ import annotations
-
 import json
 import select
 import socket
@@ -22,7 +20,7 @@ from service.live.packets import datagrams
 from service.schemas.live import LiveClock
 
 # Multicast groups of OpenTrackIO: 239.135.1.N for source number N.
-OPENTRACKIO_GROUP, OPENTRACKIO_PORT, MOST_SOURCES = "239.135.1.{number}", 55555, 200
+OPENTRACKIO_GROUP, OPENTRACKIO_PORT = "239.135.1.{number}", 55555
 # Multicast does not pass the next router.
 MULTICAST_TTL = 1
 

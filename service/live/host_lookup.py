@@ -1,7 +1,5 @@
 """Look-up of the hosts that poses are sent to, in a thread: sending never waits for a name server."""
 
-from __future__ import annotations
-
 import socket
 import threading
 import time

@@ -6,8 +6,6 @@ Each datagram has a header of 16 bytes, big-endian, and a segment of the sample:
 and the segment.
 """
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Iterator
 

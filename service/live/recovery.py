@@ -4,8 +4,6 @@ An accepted job moves the stored poses, from which tracking starts again; a reje
 worker busy for seconds to minutes and may never succeed: the pause between two jobs doubles.
 """
 
-from __future__ import annotations
-
 import math
 import tempfile
 import threading
@@ -49,10 +47,10 @@ class LiveCameras(Protocol):
 class RecoveryLog(Protocol):
     """Log of the calibrations; `lost`: ids of the cameras that were lost."""
 
-    def asked(self, lost: Sequence[str], job: Job) -> None:
+    def asked(self, lost: Sequence[str], job: "Job") -> None:
         """Log a submitted job."""
 
-    def ended(self, lost: Sequence[str], job: Job) -> None:
+    def ended(self, lost: Sequence[str], job: "Job") -> None:
         """Log the end of a job."""
 
     def failed(self, lost: Sequence[str], error: Exception) -> None:

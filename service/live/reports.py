@@ -3,8 +3,6 @@
 The threads that send poses count them, and another thread sends the reports: poses never wait for the service.
 """
 
-from __future__ import annotations
-
 import math
 import os
 import socket

@@ -1,7 +1,5 @@
 """Stored poses, sent repeatedly at the rate of the pictures, with smooth transitions to newly accepted ones."""
 
-from __future__ import annotations
-
 import math
 import threading
 import time
@@ -65,8 +63,8 @@ class StoredPoses:
         """Begin transitions to the poses of a venue. Return the ids of cameras whose poses or lenses are new."""
         with self._lock:
             before = {camera: transition.at(now) for camera, transition in self._transitions.items()}
-            stored = {camera: transition.after for camera, transition in self._transitions.items()}
-            new = [camera.id for camera in venue.cameras if not _is_alike(stored.get(camera.id), camera)]
+            stored = {id: (one.after.pose, one.after.intrinsics) for id, one in self._transitions.items()}
+            new = [one.id for one in venue.cameras if stored.get(one.id) != (one.pose, one.intrinsics)]
             self._transitions = {
                 camera.id: _Transition(before.get(camera.id, camera), camera, now)
                 if camera.id in new
@@ -81,29 +79,24 @@ class StoredPoses:
             return [NumberedCamera(one.at(now), number) for number, one in enumerate(self._transitions.values(), 1)]
 
 
-def _is_alike(stored: Camera | None, camera: Camera) -> bool:
-    return stored is not None and stored.pose == camera.pose and stored.intrinsics == camera.intrinsics
-
-
 def send_stored_poses(
     poses: StoredPoses,
     sender: PoseSender,
     rate: Fraction,
     stop: threading.Event,
     is_tracked: Callable[[str], bool] = lambda _: False,
-) -> int:
-    """Send a sample of each camera `rate` times a second until `stop`; return the number of beats.
+) -> None:
+    """Send a sample of each camera `rate` times a second until `stop`.
 
     The beat follows the machine's clock without drift. Tracked cameras are left out.
     """
-    sent, begun, beats = 0, time.monotonic(), 0
+    begun, beats = time.monotonic(), 0
     while not stop.is_set():
         stored = [shot for shot in poses.at(time.monotonic()) if not is_tracked(shot.id)]
         if stored:
             sender.send(stored, time.time_ns(), rate, STORED)
-        sent, beats = sent + 1, beats + 1
+        beats += 1
         wait_s = begun + float(beats / rate) - time.monotonic()
         if wait_s < -MOST_MISSED_S:
             begun, beats, wait_s = time.monotonic(), 0, 0.0
         stop.wait(max(wait_s, 0.0))
-    return sent

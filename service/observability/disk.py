@@ -1,7 +1,5 @@
 """Free disk space of the local folders in which database and files grow."""
 
-from __future__ import annotations
-
 import shutil
 import tempfile
 from pathlib import Path

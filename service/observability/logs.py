@@ -1,7 +1,5 @@
 """Logs: one event per line with its request or job, as JSON or for the console."""
 
-from __future__ import annotations
-
 import logging
 import sys
 from contextlib import suppress

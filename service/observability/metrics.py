@@ -4,8 +4,6 @@ Each process counts the requests that it answers. Everything else is read from t
 every API process shows the same, and restarts of workers lose nothing.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, TypeVar, get_args
 

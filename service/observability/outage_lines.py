@@ -4,8 +4,6 @@ During an outage everything that needs the database fails, some many times a sec
 traceback says no more than the first line of the error.
 """
 
-from __future__ import annotations
-
 import logging
 import sys
 import threading

@@ -5,8 +5,6 @@ are the same for every process, so that a load balancer which used them would re
 them every answer that needs none of these.
 """
 
-from __future__ import annotations
-
 import asyncio
 import time
 from collections.abc import Callable, Mapping

@@ -5,8 +5,6 @@ is loaded, which FastAPI brings. The context of a caller's trace (W3C Trace Cont
 in any case.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import sys

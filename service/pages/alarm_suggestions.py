@@ -1,7 +1,5 @@
 """Suggested alarm limits for a venue, by the spread of its own calibrations."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from datetime import datetime

@@ -1,7 +1,5 @@
 """Static files of the pages, at addresses that change with their content: browsers cache them for a year."""
 
-from __future__ import annotations
-
 import hashlib
 import mimetypes
 from functools import cache

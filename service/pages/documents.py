@@ -1,7 +1,5 @@
 """Documents of the package, rendered from Markdown to HTML with links between pages of the service."""
 
-from __future__ import annotations
-
 import re
 from functools import cache
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Numbers and times in words for people, and names of alarms and kinds of jobs."""
 
-from __future__ import annotations
-
 import re
 from datetime import UTC, datetime
 

@@ -1,7 +1,5 @@
 """Pages of jobs: the list with filters, and a job with its progress, numbers and pictures."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any, get_args
 
 from fastapi import APIRouter, Query, Request, Response
@@ -61,7 +59,6 @@ def job(job_id: JobIdPath, request: Request, context: InContext) -> Response:
 
 
 def _job_content(job_id: str, context: Context) -> dict[str, Any]:
-    """Return the content of the page of a job."""
     found = context.jobs.get(job_id)
     if found is None:
         kept = f"{context.settings.keep_jobs_days:g} days"

@@ -1,7 +1,5 @@
 """The live poses on the page of a venue: the state of each camera, and its recent rotation."""
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass
 from datetime import timedelta
 from typing import Any

@@ -1,7 +1,5 @@
 """Pages for a new venue: a plan of its cameras, from frames alone, or from pitch, lenses and clicked first poses."""
 
-from __future__ import annotations
-
 import math
 from typing import Annotated, Any, get_args
 

@@ -1,7 +1,5 @@
 """Outcomes of calibrations: their poses are in use, undone, replaced or never used; and the words for it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal
 

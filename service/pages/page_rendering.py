@@ -1,7 +1,5 @@
 """Rendering of pages from templates, with a strict Content-Security-Policy and problems as pages."""
 
-from __future__ import annotations
-
 import hashlib
 import re
 from collections.abc import Callable, Coroutine
@@ -17,7 +15,7 @@ from fastapi.exceptions import RequestValidationError
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from starlette.responses import HTMLResponse, RedirectResponse
 
-from service.api.auth import COOKIE, SCOPES, page_token
+from service.api.auth import COOKIE, missing_scope, page_token
 from service.api.problems import unreadable_problem
 from service.api.root_path import with_root_path
 from service.pages import formatting
@@ -25,7 +23,6 @@ from service.pages.assets import address
 from service.pages.seam import is_within_uncertainty, seam_curve
 from service.pages.trend_charts import trend_charts
 from service.routes.contract.guarded import Guarded
-from service.schemas.names import Scope
 from service.schemas.problems import PROBLEM_TYPES, REFUSAL_REASONS, Problem
 from service.store.database import DATABASE_OUTAGES
 from service.store.keys import Key
@@ -120,16 +117,11 @@ def render_page(request: Request, template: str, status: int = 200, **content: A
         root_path=root_path,
         key=key,
         token=page_token(token) if key and token else "",
-        may=lambda scope: has_scope(key, scope),
+        may=lambda scope: missing_scope(key, scope) is None,
         path=request.url.path,
         **content,
     )
     return HTMLResponse(with_root_path(text, root_path), status, HEADERS)
-
-
-def has_scope(key: Key | None, needed: Scope) -> bool:
-    """True if a key has a scope, or no key is needed (None)."""
-    return key is None or SCOPES.index(key.scope) >= SCOPES.index(needed)
 
 
 def problem_page(request: Request, problem: Problem) -> Response:

@@ -1,7 +1,5 @@
 """Explanations of problems and of rejected poses, as pages for browsers at addresses where programs get JSON."""
 
-from __future__ import annotations
-
 from http import HTTPStatus
 from typing import Annotated, Any
 

@@ -1,7 +1,5 @@
 """SVG chart of a seam: the distance between two cameras' positions of the same paint, along the seam."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from service.schemas.results import PairResult, SeamPlace

@@ -1,7 +1,5 @@
 """Signing in with an API key, and signing out."""
 
-from __future__ import annotations
-
 from http import HTTPStatus
 from typing import Annotated
 from urllib.parse import parse_qs, urlsplit

@@ -1,7 +1,5 @@
 """Small curves as SVG paths, such as the last stitch errors of a venue."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Data of the trend charts of a camera: its movement at the far touchline and its focal length, night by night."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
@@ -9,6 +7,7 @@ from math import hypot
 from typing import Any
 
 from service.schemas.trend import Chart, Trend, TrendPoint, TrendState
+from service.store.trend_charts import date_text, state_of
 
 LEAST_TOP_CM, LEAST_TOP_PERCENT = 2.0, 0.05
 """Least ends of the scales: harmless noise looks harmless."""
@@ -55,7 +54,7 @@ def _moved(point: TrendPoint, alarm_m: float) -> _Night:
     charts = {chart.quantity: chart for chart in point.charts}
     across, away = charts["across"], charts["away"]
     average = hypot(_average(point.across_m, across), _average(point.away_m, away))
-    state = _state(across.beyond or away.beyond, hypot(across.mean_m, away.mean_m), alarm_m)
+    state = state_of(beyond=across.beyond or away.beyond, moved_m=hypot(across.mean_m, away.mean_m), alarm_m=alarm_m)
     return _Night(point.at, 100 * point.displacement_m, 100 * point.sigma_m, 100 * average, state)
 
 
@@ -64,13 +63,8 @@ def _lens(point: TrendPoint, alarm_m: float) -> _Night | None:
     if chart is None or point.focal_length is None or point.sigma_focal_length is None:
         return None
     average = _average(point.focal_length, chart)
-    state = _state(chart.beyond, abs(chart.mean_m), alarm_m)
+    state = state_of(beyond=chart.beyond, moved_m=abs(chart.mean_m), alarm_m=alarm_m)
     return _Night(point.at, 100 * point.focal_length, 100 * point.sigma_focal_length, 100 * average, state)
-
-
-def _state(beyond: bool, moved_m: float, alarm_m: float) -> TrendState:
-    """Return the state of a night by the control charts of one quantity."""
-    return "quiet" if not beyond else "alarm" if moved_m >= alarm_m else "drifting"
 
 
 def _average(value: float, chart: Chart) -> float:
@@ -81,7 +75,7 @@ def _average(value: float, chart: Chart) -> float:
 def _chart(camera: str, title: str, nights: Sequence[_Night], unit: str, scale: tuple[float, float]) -> TrendChart:
     first, last = nights[0], nights[-1]
     places = 1 if unit == "cm" else 3
-    period = f"from {_date(first.at)} to {_date(last.at)}"
+    period = f"from {date_text(first.at)} to {date_text(last.at)}"
     return TrendChart(
         title=f"{title}, {unit}",
         words=f"Camera {camera}. {title}, {period}: last {last.value:.{places}f} ± {last.sigma:.{places}f} {unit}",
@@ -96,7 +90,3 @@ def _chart(camera: str, title: str, nights: Sequence[_Night], unit: str, scale: 
             "state": [night.state for night in nights],
         },
     )
-
-
-def _date(at: datetime) -> str:
-    return f"{at.day} {at:%B %Y}"

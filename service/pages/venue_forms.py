@@ -1,7 +1,5 @@
 """Forms of a venue: its settings, ignored areas and first poses, and frames for a calibration or a search."""
 
-from __future__ import annotations
-
 import json
 from typing import get_args
 

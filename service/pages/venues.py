@@ -1,7 +1,5 @@
 """Pages of venues: the list, and one venue with its last result, history and settings."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta

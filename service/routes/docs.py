@@ -1,7 +1,5 @@
 """API documentation in a browser, from files of the package: it needs no internet."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from fastapi import APIRouter, Response

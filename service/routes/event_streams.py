@@ -1,7 +1,5 @@
 """Stream of a venue's events (server-sent events): its poses now, then every change."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import AsyncIterable
 from typing import Annotated

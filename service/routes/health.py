@@ -1,7 +1,5 @@
 """Health, readiness and metrics of the service, and the meaning of its problems."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from fastapi import APIRouter, Path, Response

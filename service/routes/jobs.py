@@ -1,7 +1,5 @@
 """Jobs: their progress, results and decisions about them."""
 
-from __future__ import annotations
-
 from collections.abc import AsyncIterable, AsyncIterator, Callable
 from datetime import timedelta
 from http import HTTPStatus
@@ -20,7 +18,7 @@ from service.routes.contract.guarded import Guarded
 from service.routes.contract.paged import CURSOR, LIMIT, NEXT_PAGE, next_page
 from service.routes.contract.problem_docs import OF_EXPORTS, problem_responses
 from service.routes.contract.restricted import OnlyVenues, lists_by_venue
-from service.routes.contract.tagged import TAGGED, IfNoneMatch, tagged_response
+from service.routes.contract.tagged import TAGGED, IfNoneMatch, tagged_json
 from service.schemas.job import Job, Jobs
 from service.schemas.names import ID_PATTERN, JOB_ID_PATTERN, OPEN_STATUSES, JobKind, JobStatus, ListFields
 from service.schemas.problems import Problem
@@ -43,8 +41,7 @@ EVENT_AT_LEAST_EVERY_S = 10
 
 def job_response(job: Job, *, status: int = 200, if_none_match: str | None = None) -> Response:
     """Return a job as response: body, ETag, Location of a new one, Retry-After while it is open."""
-    body = hide_other_asker(job).model_dump_json().encode()
-    answer = tagged_response(body, if_none_match, lambda: Response(body, status, media_type="application/json"))
+    answer = tagged_json(hide_other_asker(job), if_none_match, status)
     if job.open:
         answer.headers["Retry-After"] = str(RETRY_AFTER_S)
     if answer.status_code == HTTPStatus.ACCEPTED:

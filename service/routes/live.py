@@ -1,7 +1,5 @@
 """Reports about the live poses of a venue, from the process that sends them."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import AsyncIterable
 from functools import partial

@@ -1,7 +1,5 @@
 """Pictures of jobs, and layers to lay over them."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from fastapi import APIRouter, Path, Response

@@ -1,7 +1,5 @@
 """Plan of cameras before they are mounted."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Response

@@ -1,7 +1,5 @@
 """Frame of what a camera shows now, fetched from its source."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from fastapi import APIRouter, Response
@@ -12,7 +10,7 @@ from service.routes.contract.documented import BINARY, needs_scope
 from service.routes.contract.guarded import Guarded
 from service.routes.contract.problem_docs import OF_IMAGES, OF_SOURCES, problem_responses
 from service.schemas.file_kinds import PNG_START
-from service.store.refusals import camera_of, no_such_venue
+from service.store.refusals import camera_of
 
 router = APIRouter(tags=["venues"], route_class=Guarded)
 PICTURE: dict[int | str, dict[str, Any]] = {200: {"content": {"image/jpeg": BINARY, "image/png": BINARY}}}
@@ -34,10 +32,7 @@ PICTURE: dict[int | str, dict[str, Any]] = {200: {"content": {"image/jpeg": BINA
 )
 async def fetch_snapshot(venue_id: VenueIdPath, camera: CameraIdPath, context: InContext) -> Response:
     """Fetch a frame of a camera from its source, as it comes. Requests within two seconds get the same."""
-    found = await run_in_threadpool(context.venues.with_credentials, venue_id)
-    if found is None:
-        raise no_such_venue(venue_id)
-    venue, credentials = found
+    venue, credentials = await run_in_threadpool(context.venues.with_credentials, venue_id)
     data = await context.camera_views.frame(venue.id, camera_of(venue, camera), credentials)
     media_type = "image/png" if data.startswith(PNG_START) else "image/jpeg"
     return Response(data, media_type=media_type, headers={"Cache-Control": "no-store"})

@@ -1,7 +1,5 @@
 """Stitched view of a venue for other tools, and its preview."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal

@@ -1,7 +1,5 @@
 """Venues: fields and their cameras, with the poses in use."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime, time
 from typing import Annotated, Any, Literal
@@ -26,7 +24,7 @@ from service.routes.contract.guarded import Guarded
 from service.routes.contract.paged import CURSOR, LIMIT, NEXT_PAGE, next_page
 from service.routes.contract.problem_docs import OF_EXPORTS, problem_responses
 from service.routes.contract.restricted import OnlyVenues, lists_by_venue
-from service.routes.contract.tagged import TAGGED, IfNoneMatch, json_response, tagged_response
+from service.routes.contract.tagged import TAGGED, IfNoneMatch, tagged_json
 from service.schemas import etags
 from service.schemas.base import Day, Name
 from service.schemas.events import callback_urls
@@ -190,8 +188,7 @@ def list_venues(
 )
 def get_venue(venue: ExistingVenue, if_none_match: IfNoneMatch = None) -> Response:
     """Return a venue with the poses in use."""
-    body = venue.with_hidden_callbacks().model_dump_json().encode()
-    return tagged_response(body, if_none_match, json_response(body))
+    return tagged_json(venue.with_hidden_callbacks(), if_none_match)
 
 
 @router.get(
@@ -231,8 +228,7 @@ def list_revisions(
     page = context.venues.history_page(venue_id, cursor, limit)
     revisions = [hide_other_actor(revision) for revision in page.revisions]
     shown = History(revisions=revisions, unreadable=page.unreadable, next_cursor=page.next_cursor)
-    body = shown.model_dump_json().encode()
-    answer = tagged_response(body, if_none_match, json_response(body))
+    answer = tagged_json(shown, if_none_match)
     answer.headers.update(next_page(request, shown.next_cursor))
     return answer
 
@@ -256,8 +252,7 @@ def get_camera_trend(
     """
     camera_of(venue, camera)
     first = None if since is None else datetime.combine(since, time.min, UTC)
-    body = context.trends.of(venue, camera, first).model_dump_json().encode()
-    return tagged_response(body, if_none_match, json_response(body))
+    return tagged_json(context.trends.of(venue, camera, first), if_none_match)
 
 
 @router.get(
@@ -284,8 +279,7 @@ def get_picture_motion(
     then, now = camera_of(before, camera), camera_of(venue, camera)
     homographies = picture_motion(venue.field, then, now)
     motion = PictureMotion(since=since, revision=revision, image_size=now.image_size, **homographies)
-    body = motion.model_dump_json().encode()
-    return tagged_response(body, if_none_match, json_response(body))
+    return tagged_json(motion, if_none_match)
 
 
 @router.get("/{venue_id}/health", openapi_extra=needs_scope("read"))

@@ -1,7 +1,5 @@
 """The author of a change: name, address and request."""
 
-from __future__ import annotations
-
 from typing import Self
 
 from pydantic import Field
@@ -27,7 +25,7 @@ class Actor(Schema):
     )
     request_id: str | None = Field(description="`X-Request-ID` of the request; its log lines carry it too.")
 
-    def without_address(self) -> Actor:
+    def without_address(self) -> "Actor":
         """Return the actor without the client's address, for receivers outside: an address is personal data."""
         return self.model_copy(update={"address": None})
 

@@ -1,19 +1,22 @@
-"""Types of addresses in requests: sources of frames and callback URLs; and parsing of IP addresses."""
+"""Types of addresses in requests: sources of frames and callback URLs; their hidden parts; and IP addresses."""
 
-from __future__ import annotations
-
+import hashlib
 import re
+from collections.abc import Collection
 from ipaddress import IPv4Address, IPv6Address, ip_address
 from typing import Annotated
 from urllib.parse import urlsplit
 
 from pydantic import AfterValidator, HttpUrl, StringConstraints
 
+from service.schemas.problems import Problem
+
 IpAddress = IPv4Address | IPv6Address
 # Normalised as browsers do: 0x7f.1 becomes 127.0.0.1, so that later checks see the real host.
 CallbackUrl = Annotated[str, StringConstraints(max_length=1024), AfterValidator(lambda url: str(HttpUrl(url)))]
 # Replaces a secret in an address that is shown.
 HIDDEN = "***"
+HIDDEN_URL = re.compile(rf"https?://[^/]+/{re.escape(HIDDEN)}-[0-9a-f]{{8}}")
 SOURCE_SCHEMES = ("http", "https", "rtsp", "rtsps")
 # The SHA-256 of the certificate that a camera must have: most sign their own, which no authority vouches for.
 PINNED = re.compile(r"(https|rtsps)://[^#]*#tls_sha256=(?:[0-9a-f]{2}:?){32}", re.IGNORECASE)
@@ -45,3 +48,26 @@ def ip_of(host: str) -> IpAddress | None:
         return ip_address(host)
     except ValueError:
         return None
+
+
+def hide_path(url: str) -> str:
+    """Return a callback's URL with its path replaced by a short hash, by which the service recognises it.
+
+    Anybody who knows the path of one may often post there.
+    """
+    parts = urlsplit(url)
+    if parts.path in ("", "/") and not parts.query and not parts.fragment:
+        return url
+    return f"{parts.scheme}://{parts.netloc}/{HIDDEN}-{hashlib.sha256(url.encode()).hexdigest()[:8]}"
+
+
+def restore_url(url: str, known: Collection[str]) -> str:
+    """Return the known URL whose shortened form a client sent back; any other URL unchanged."""
+    if not HIDDEN_URL.fullmatch(url):
+        return url
+    for address in known:
+        if hide_path(address) == url:
+            return address
+    raise Problem(
+        "callback-refused", f"This venue has no address that is shown as {url}: send the address itself.", got=url
+    )

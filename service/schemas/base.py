@@ -4,8 +4,6 @@ The models are strict about requests. Documents that another version of ESC may 
 stored rows) are read by the same models with `TOLERANTLY`.
 """
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from datetime import date

@@ -1,7 +1,5 @@
 """Check of a calibration that anybody made: its options, a grade for each camera, and the cause."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal
 
 from pydantic import ConfigDict, Field

@@ -1,7 +1,5 @@
 """Model of the pitch: a sport's template or custom markings, its dimensions and its ridge."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 from typing import Annotated, Any, Self
@@ -275,11 +273,11 @@ class FieldOfPlay(Schema):
         value: float = getattr(self, name)
         return value
 
-    def with_number(self, name: FieldNumber, value: float) -> FieldOfPlay:
+    def with_number(self, name: FieldNumber, value: float) -> "FieldOfPlay":
         """Return the field with another value of a dimension, m. Raises `ValidationError` if the sport forbids it."""
         return self.changed({"ridge": self._ridge_at(value)} if name == "ridge_height_m" else {name: value})
 
-    def changed(self, values: dict[str, Any]) -> FieldOfPlay:
+    def changed(self, values: dict[str, Any]) -> "FieldOfPlay":
         """Return the field with other values. Raises `ValidationError` if the sport forbids them."""
         return FieldOfPlay.model_validate(self.model_dump() | values)
 

@@ -1,7 +1,5 @@
 """Recognition of file types by their first bytes, for error messages about files that are no JPEG or PNG."""
 
-from __future__ import annotations
-
 JPEG_START = b"\xff\xd8\xff"
 JPEG_BEGIN = b"\xff\xd8"
 PNG_START = b"\x89PNG\r\n\x1a\n"

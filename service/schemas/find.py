@@ -1,7 +1,5 @@
 """Input of a search for cameras, and the venue that is made of its result."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping
 from typing import Annotated, Literal, Self
 
@@ -76,7 +74,7 @@ class SoughtSite(NamedField):
         return [camera.id for camera in self.cameras if camera.pose is None]
 
     @classmethod
-    def of(cls, venue: Venue, options: FindOptions, with_frames: Collection[str]) -> SoughtSite:
+    def of(cls, venue: Venue, options: FindOptions, with_frames: Collection[str]) -> "SoughtSite":
         """Return the site of a stored venue; the cameras of the options, or all that have frames, lose their poses."""
         sought = with_frames if options.cameras is None else options.cameras
         cameras = [_sought(one, options) if one.id in sought else _known(one) for one in venue.cameras]

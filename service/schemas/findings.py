@@ -1,7 +1,5 @@
 """Validation errors of pydantic in words for people who write documents."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 from typing import Any, get_args
@@ -171,7 +169,6 @@ def _suggestion(place: Location, model: Any) -> str:
 
 
 def _models(annotation: Any) -> list[type[BaseModel]]:
-    """Return the models that an annotation mentions."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         root = annotation.model_fields.get("root")
         return [annotation] if root is None else _models(root.annotation)

@@ -1,7 +1,5 @@
 """Comparison of a frame's size with the image size of its camera, and messages about a mismatch."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 SAME_ASPECT = 0.005

@@ -4,8 +4,6 @@ World: right-handed, metres, origin at the pitch centre on z = 0, x along the to
 Cameras are OpenCV's: x right, y down, z forward, pixel centres at integers.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Annotated, Self
 
@@ -76,13 +74,13 @@ class Pose(Schema):
     translation: list[float] = Field(description="OpenCV's tvec = -R·position, m.")
 
     @classmethod
-    def from_position(cls, rotation: list[float], position: list[float]) -> Pose:
+    def from_position(cls, rotation: list[float], position: list[float]) -> "Pose":
         """Return the pose of a rotation vector (rad) and a camera centre (m)."""
         translation = [-component for component in rotate(rotation, position)]
         return cls(rotation=rotation, position=position, translation=translation)
 
     @classmethod
-    def from_input(cls, pose: PoseIn) -> Pose:
+    def from_input(cls, pose: PoseIn) -> "Pose":
         """Return the pose of a request, whose numbers are kept to the last digit."""
         if pose.translation is None:
             assert pose.position is not None
@@ -146,11 +144,11 @@ class Intrinsics(Schema):
         return self
 
     @property
-    def without_sigma(self) -> Intrinsics:
+    def without_sigma(self) -> "Intrinsics":
         """The lens without its uncertainty, for comparing lenses."""
         return self.model_copy(update={"sigma": None, "sigma_from": None})
 
-    def with_sigma_of(self, other: Intrinsics) -> Intrinsics:
+    def with_sigma_of(self, other: "Intrinsics") -> "Intrinsics":
         """Return this lens, with the uncertainty of `other` if both are the same lens."""
         return other if other.without_sigma == self.without_sigma else self
 
@@ -223,7 +221,7 @@ class PosedCamera(UnposedCamera):
     pose: Pose
 
     @property
-    def pose_and_lens(self) -> PosedCamera:
+    def pose_and_lens(self) -> "PosedCamera":
         """The camera without the uncertainty of its lens."""
         return self.model_copy(update={"intrinsics": self.intrinsics.without_sigma})
 

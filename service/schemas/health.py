@@ -1,7 +1,5 @@
 """Models of the health of a service and its venues, of alarm rules and active alarms."""
 
-from __future__ import annotations
-
 from datetime import datetime
 from typing import Annotated, Any, Literal
 

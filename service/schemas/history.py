@@ -1,7 +1,5 @@
 """Models of the history of a venue's poses, and of requests that restore or adopt poses."""
 
-from __future__ import annotations
-
 from datetime import datetime
 from typing import Annotated, Literal
 

@@ -1,7 +1,5 @@
 """Lists of hosts that an operator allows: names with wildcards, and networks."""
 
-from __future__ import annotations
-
 import ipaddress
 from collections.abc import Collection, Sequence
 from fnmatch import fnmatchcase

@@ -1,7 +1,5 @@
 """Models of a job: state, progress, result, and the event of its end."""
 
-from __future__ import annotations
-
 from datetime import datetime
 from typing import Annotated, Any, Literal, get_args
 
@@ -151,7 +149,7 @@ class JobEvent(Attributed):
     data: Job = Field(description="The job at its end; for `job.queued`, at its submission.")
 
     @classmethod
-    def of(cls, job: Job) -> JobEvent:
+    def of(cls, job: Job) -> "JobEvent":
         """Return the event of an ended job."""
         data = job.model_copy(update={"callback": None})
         return cls.model_validate({"type": f"job.{job.status}", "timestamp": job.finished_at, "data": data})

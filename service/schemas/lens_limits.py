@@ -1,7 +1,5 @@
 """Limits of lens parameters, and the warning about a lens of unknown accuracy. No models."""
 
-from __future__ import annotations
-
 LEAST_SIGMA, LARGEST_SIGMA = 1e-9, 1e6
 # The effect of a coefficient depends on the lens (`lens_map` judges it): the sixth-order term of the longest lens that
 # is allowed, whose focal length is 200 times its picture, is about 1e13 where it shifts a corner by a tenth. With

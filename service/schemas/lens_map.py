@@ -7,8 +7,6 @@ thousands and shifts a corner by a pixel, and rational lenses have large coeffic
 along spokes around the axis, are distorted; along each spoke the map is valid until it stands still or turns back.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Models of live poses: the reports of `esc live`, the newest state, and the history by minute."""
 
-from __future__ import annotations
-
 import re
 from datetime import datetime
 from typing import Annotated, Any, Literal, Self
@@ -105,7 +103,7 @@ class LiveCamera(_LiveCamera):
     pose: Pose | None = Field(None, description="The pose that was sent last.")
 
     @classmethod
-    def from_input(cls, camera: LiveCameraIn) -> LiveCamera:
+    def from_input(cls, camera: LiveCameraIn) -> "LiveCamera":
         """Return the camera of a report with its pose in both conventions."""
         pose = None if camera.pose is None else Pose.from_input(camera.pose)
         return cls(**dict(camera) | {"pose": pose})
@@ -196,7 +194,7 @@ class LiveMinuteCamera(Schema):
     turned_deg: float | None = Field(None, description="The largest turn from its stored pose.")
     latency_ms: LatencyMs | None = Field(None, description="The worst of the minute's reports.")
 
-    def with_report(self, camera: LiveCameraIn) -> LiveMinuteCamera:
+    def with_report(self, camera: LiveCameraIn) -> "LiveMinuteCamera":
         """Return the minute with one more report added."""
         turns = [turn for turn in (self.turned_deg, camera.turned_deg) if turn is not None]
         latencies = [latency for latency in (self.latency_ms, camera.latency_ms) if latency is not None]

@@ -4,8 +4,6 @@ One addition: a list of things that have ids may be patched by an object of thos
 source could only be changed by sending all cameras, with the poses that they happened to have when they were read.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 MEDIA_TYPE = "application/merge-patch+json"

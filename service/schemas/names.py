@@ -1,7 +1,5 @@
 """Identifiers and enumerations of the interface, without its models: the command line loads them for its help."""
 
-from __future__ import annotations
-
 import re
 import unicodedata
 from collections.abc import Mapping

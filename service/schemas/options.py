@@ -1,7 +1,5 @@
 """Options of jobs: calibrations, lenses from photos, first poses, field fits and searches for cameras."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal, Self
 
 from pydantic import ConfigDict, Field, RootModel, StringConstraints, model_validator

@@ -1,7 +1,5 @@
 """Models of a plan: cameras that are not mounted yet, and what a calibration would make of them."""
 
-from __future__ import annotations
-
 from math import atan, degrees
 from typing import Annotated, Literal, Self
 
@@ -137,7 +135,7 @@ class PlannedSite(VenueSettings):
             raise ValueError("a plan needs cameras, or stands to propose cameras for")
         return self
 
-    def to_sought(self, planned: PlanResult) -> SoughtSite:
+    def to_sought(self, planned: "PlanResult") -> SoughtSite:
         """Return the site for a search once the cameras are mounted: what is planned of each, and what is known."""
         known = {camera.id: camera for camera in self.cameras}
         return SoughtSite(
@@ -148,7 +146,7 @@ class PlannedSite(VenueSettings):
         )
 
 
-def _sought(planned: PlannedCameraResult, given: PlannedCameraIn | None) -> SoughtCameraIn:
+def _sought(planned: "PlannedCameraResult", given: PlannedCameraIn | None) -> SoughtCameraIn:
     lens = None if given is None else given.intrinsics
     return SoughtCameraIn(
         id=planned.id,

@@ -3,8 +3,6 @@
 A rejected pose is no error; each reason has a stable word, an explanation and advice.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Refusal of a result after the engine's gate has accepted it."""
 
-from __future__ import annotations
-
 from typing import TYPE_CHECKING
 
 from service.schemas.names import refusal_uri
@@ -10,7 +8,7 @@ if TYPE_CHECKING:
     from service.schemas.results import Result
 
 
-def refuse(result: Result, because: str, reason: str = "all-or-none") -> Result:
+def refuse(result: "Result", because: str, reason: str = "all-or-none") -> "Result":
     """Return a result with every pose refused, for a reason of `REFUSAL_REASONS` (`service.schemas.problems`).
 
     The reasons that it was rejected for before stay. It may also be a document of `worker.jobs.documents`.

@@ -1,7 +1,5 @@
 """Results of each kind of job, with their uncertainties and verdicts."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from datetime import datetime
 from types import MappingProxyType

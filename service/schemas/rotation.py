@@ -1,7 +1,5 @@
 """Rotation of vectors without NumPy, for commands that must start quickly."""
 
-from __future__ import annotations
-
 import math
 
 

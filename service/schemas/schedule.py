@@ -4,8 +4,6 @@ Thousands of venues may have the same cron expression. So that they do not all l
 each fires with a fixed delay of its own: at most 15 minutes, and never after its next time.
 """
 
-from __future__ import annotations
-
 import hashlib
 from datetime import UTC, datetime, timedelta
 from typing import Annotated, Self

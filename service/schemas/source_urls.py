@@ -1,7 +1,5 @@
 """Secrets in the address of a camera: user and password before the host, and secret parameters."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -31,7 +29,7 @@ class SourceSecrets:
     parameters: tuple[tuple[str, str], ...] = ()
 
     @classmethod
-    def decoded(cls, text: str) -> SourceSecrets:
+    def decoded(cls, text: str) -> "SourceSecrets":
         """Return the secrets of the stored form: user and password and, after a `?`, the parameters."""
         userinfo, _, rest = text.partition("?")
         parameters = tuple(
@@ -44,7 +42,7 @@ class SourceSecrets:
         parameters = "&".join(f"{name}={value}" for name, value in self.parameters)
         return (self.userinfo or "") + (f"?{parameters}" if parameters else "")
 
-    def fill_hidden(self, known: SourceSecrets) -> SourceSecrets:
+    def fill_hidden(self, known: "SourceSecrets") -> "SourceSecrets":
         """Return the secrets with hidden ones (`***`) replaced by `known` ones. Raises `UnknownSecret`."""
         userinfo = self.userinfo
         if userinfo == HIDDEN:
@@ -55,7 +53,7 @@ class SourceSecrets:
             userinfo, tuple(self._fill_hidden(number, known) for number in range(len(self.parameters)))
         )
 
-    def _fill_hidden(self, number: int, known: SourceSecrets) -> tuple[str, str]:
+    def _fill_hidden(self, number: int, known: "SourceSecrets") -> tuple[str, str]:
         name, value = self.parameters[number]
         if value != HIDDEN:
             return name, value

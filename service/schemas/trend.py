@@ -4,8 +4,6 @@ The anchor of a camera is its first accepted pose after somebody last set its po
 result accepted by hand, or a restored revision.
 """
 
-from __future__ import annotations
-
 from datetime import datetime
 from typing import Annotated, Literal
 
@@ -50,7 +48,7 @@ class Displacement(Schema):
         0.0, description="Shift of the point on the ground per unit of `focal_length`, that is for a doubled one, m."
     )
 
-    def as_anchor(self) -> Displacement:
+    def as_anchor(self) -> "Displacement":
         """Return the displacement of the anchor itself: zero."""
         still = {"anchor": None, "across_m": 0.0, "away_m": 0.0, "rotation_deg": 0.0, "position_m": 0.0}
         return self.model_copy(update=still)

@@ -1,14 +1,12 @@
 """Models of a venue in requests and answers: a pitch and the cameras around it."""
 
-from __future__ import annotations
-
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Annotated, Any, Literal, Self, TypeVar
 
 from pydantic import AfterValidator, ConfigDict, Field, model_validator
 
 from service.schemas import source_urls
-from service.schemas.addresses import HIDDEN, SourceUrl
+from service.schemas.addresses import HIDDEN, SourceUrl, hide_path, restore_url
 from service.schemas.base import (
     OPEN_WORD,
     UNREADABLE,
@@ -20,7 +18,6 @@ from service.schemas.base import (
     is_empty,
     is_none,
 )
-from service.schemas.events import hidden_urls
 from service.schemas.events.webhooks import WEBHOOK_EXAMPLE, Webhook
 from service.schemas.field import FieldOfPlay
 from service.schemas.geometry import Light, Pose, PosedCamera, PoseIn, UnposedCamera, check_lens
@@ -195,6 +192,11 @@ class VenueSettings(NamedField):
         None, description="Settings of its stitched view; null: chosen to suit the cameras."
     )
 
+    def with_cameras(self, parts: Mapping[str, Mapping[str, Any]], **others: Any) -> Self:
+        """Return the venue with other `parts` of the named cameras, and with `others` of its own."""
+        cameras = [camera.model_copy(update=parts.get(camera.id)) for camera in self.cameras]
+        return self.model_copy(update={"cameras": cameras, **others})
+
 
 class VenueIn(VenueSettings):
     """A venue in a request."""
@@ -228,7 +230,7 @@ class VenueIn(VenueSettings):
             camera.id: source_urls.secrets_of(camera.source) for camera in self.cameras if camera.source is not None
         }
 
-    def to_venue(self) -> Venue:
+    def to_venue(self) -> "Venue":
         """Return the venue with poses in both conventions."""
         cameras = [Camera(**dict(camera) | {"pose": Pose.from_input(camera.pose)}) for camera in self.cameras]
         parts = {name: value for name, value in self if name != "warnings"}
@@ -272,12 +274,12 @@ class Venue(VenueSettings):
 
     def with_hidden_callbacks(self) -> Self:
         """Return the venue for an answer: URLs of callbacks are shortened, since their paths may be secret."""
-        return self._with_callbacks(hidden_urls.hide_path)
+        return self._with_callbacks(hide_path)
 
-    def with_callbacks_of(self, before: Venue | None) -> Self:
+    def with_callbacks_of(self, before: "Venue | None") -> Self:
         """Return the venue with shortened URLs of callbacks replaced by the full ones that it had before."""
         known = [] if before is None else before.callbacks
-        return self._with_callbacks(lambda url: hidden_urls.restore_url(url, known))
+        return self._with_callbacks(lambda url: restore_url(url, known))
 
     def _with_callbacks(self, change: Callable[[str], str]) -> Self:
         def changed(part: T) -> T:
@@ -288,31 +290,28 @@ class Venue(VenueSettings):
         webhooks = [webhook.model_copy(update={"url": change(webhook.url)}) for webhook in self.webhooks]
         return self.model_copy(update={"alarms": changed(self.alarms), "schedule": schedule, "webhooks": webhooks})
 
-    def with_poses(self, poses: dict[str, Pose]) -> Venue:
-        """Return the venue with other poses of the named cameras."""
-        cameras = [camera.model_copy(update={"pose": poses.get(camera.id, camera.pose)}) for camera in self.cameras]
-        return self.model_copy(update={"cameras": cameras})
-
     def to_input(self) -> VenueIn:
         """Return the venue as a request has it."""
         once = {"cameras": {"__all__": {"pose": {"translation"}}}}
         return VenueIn.model_validate(self.model_dump(exclude=once))
 
-    def changed_parts(self, other: Venue) -> list[str]:
+    def changed_parts(self, other: "Venue") -> list[str]:
         """Return the names of the fields that differ from another venue's."""
         return [name for name in type(self).model_fields if getattr(self, name) != getattr(other, name)]
 
-    def has_same_poses_as(self, other: Venue) -> bool:
+    def has_same_poses_as(self, other: "Venue") -> bool:
         """True if both have the same cameras with the same poses and lenses, and the same ridge."""
         return self.poses_and_lenses == other.poses_and_lenses and self.field.ridge == other.field.ridge
 
-    def has_same_calibration_input_as(self, other: Venue) -> bool:
+    def has_same_calibration_input_as(self, other: "Venue") -> bool:
         """True if both have the same field, lenses and poses, so that a calibration of one is one of the other."""
         return self.field == other.field and self.poses_and_lenses == other.poses_and_lenses
 
-    def accepts_frames_of(self, other: Venue) -> bool:
+    def accepts_frames_of(self, other: "Venue") -> bool:
         """True if frames of the other can be calibrated here: same field, cameras and lenses, whatever their poses."""
-        return self.has_same_calibration_input_as(other.with_poses(self.poses))
+        return self.has_same_calibration_input_as(
+            other.with_cameras({camera: {"pose": pose} for camera, pose in self.poses.items()})
+        )
 
 
 class ChangedVenue(Venue):
@@ -332,7 +331,7 @@ class ChangedVenue(Venue):
     )
 
     @classmethod
-    def of(cls, venue: Venue, pose_warnings: list[str]) -> ChangedVenue:
+    def of(cls, venue: Venue, pose_warnings: list[str]) -> "ChangedVenue":
         """Return the answer to a change of a venue."""
         return cls(**dict(venue), warnings=pose_warnings + venue.lens_warnings + venue.field.warnings)
 

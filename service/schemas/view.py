@@ -1,7 +1,5 @@
 """Settings of a stitched view: stored with a venue, or overridden by a request."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Annotated, Any
 
@@ -47,6 +45,6 @@ class ViewChoice(Schema):
         "outside. null: chosen to suit the content.",
     )
 
-    def but(self, changes: Mapping[str, Any]) -> ViewChoice:
+    def but(self, changes: Mapping[str, Any]) -> "ViewChoice":
         """Return the settings with some of them changed."""
         return self.model_copy(update=dict(changes))

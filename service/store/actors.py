@@ -1,7 +1,5 @@
 """Actors of changes as columns of a row: `asked_by`, `address` and `request_id`."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from service.schemas.actor import Actor

@@ -5,8 +5,6 @@ person stores one of these as a new revision. Calibrations offer theirs as long 
 searches as long as it stands as they began with it. Otherwise the offer is about other poses, or another field.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -70,11 +68,14 @@ class AdoptionRepository(Repository):
         """
         with changing_venue(self._engine, venue_id, precondition) as (connection, stored):
             before = stored.venue
-            camera_of(before, camera_id)
+            camera = camera_of(before, camera_id)
             job_id, refined = _refined_of(connection, before).get(camera_id, (None, None))
             if refined is None:
                 raise no_refined_pose(camera_id, no_refined_since(venue_id))
-            venue = with_refined(before, {camera_id: refined}, keep_sigma=True)
+            # A lens that is stored must not bring the certainty that the lines gave it: the next job asks the same
+            # lines again, from the camera's memory.
+            lens = refined.intrinsics.model_copy(update={"sigma": camera.intrinsics.sigma})
+            venue = before.with_cameras({camera_id: {"pose": refined.pose, "intrinsics": lens}})
             if not venue.has_same_poses_as(before):
                 memories = newest_memories(connection, venue_id)
                 changes = with_venue(load(connection, venue_id), stored, venue)
@@ -189,26 +190,6 @@ class AdoptionRepository(Repository):
 # Refined poses
 
 
-def with_refined(venue: Venue, refined: dict[str, Refined], *, keep_sigma: bool = False) -> Venue:
-    """Return a venue with the refined poses and lenses of some of its cameras.
-
-    `keep_sigma`: their lenses are said to be known as well as before. A lens that is stored must not bring the
-    certainty that the lines gave it: the next job asks the same lines again, from the camera's memory.
-    """
-    cameras = [
-        _refined_camera(camera, refined[camera.id], keep_sigma=keep_sigma) if camera.id in refined else camera
-        for camera in venue.cameras
-    ]
-    return venue.model_copy(update={"cameras": cameras})
-
-
-def _refined_camera(camera: Camera, refined: Refined, *, keep_sigma: bool) -> Camera:
-    lens = refined.intrinsics
-    if keep_sigma:
-        lens = lens.model_copy(update={"sigma": camera.intrinsics.sigma})
-    return camera.model_copy(update={"pose": refined.pose, "intrinsics": lens})
-
-
 def _refined_of(connection: sa.Connection, venue: Venue) -> dict[str, tuple[str, Refined]]:
     """Return by camera the calibration that brought its pose, and the refined pose that it found."""
     refined: dict[str, tuple[str, Refined]] = {}
@@ -238,7 +219,8 @@ def _has_pose_of(camera: Camera, calibrated: Camera, refined: Refined | None) ->
     """Return True if a camera has the pose and lens that a calibration found, or the refined ones."""
     poses = [calibrated.posed.pose_and_lens]
     if refined is not None:
-        poses.append(_refined_camera(calibrated, refined, keep_sigma=True).posed.pose_and_lens)
+        found = calibrated.model_copy(update={"pose": refined.pose, "intrinsics": refined.intrinsics})
+        poses.append(found.posed.pose_and_lens)
     return camera.posed.pose_and_lens in poses
 
 
@@ -347,16 +329,14 @@ def _with_found(before: Venue | None, found: FoundSite, choice: Mapping[str, int
     if before is None or found.began_with is None:
         return placed
     chosen = found.result.chosen(choice)
-    moved = {camera.id: camera for camera in placed.cameras if camera.id in chosen}
-    cameras = [
-        camera.model_copy(update={"pose": moved[camera.id].pose, "intrinsics": moved[camera.id].intrinsics})
-        if camera.id in moved
-        else camera
-        for camera in before.cameras
-    ]
+    moved = {
+        camera.id: {"pose": camera.pose, "intrinsics": camera.intrinsics}
+        for camera in placed.cameras
+        if camera.id in chosen
+    }
     # A ridge belongs to the poses of all cameras.
     field = placed.field if len(moved) == len(before.cameras) else before.field
-    return before.model_copy(update={"cameras": cameras, "field": field})
+    return before.with_cameras(moved, field=field)
 
 
 def _is_untouched(venue: Venue, began_with: Venue, cameras: Sequence[str]) -> bool:

@@ -3,8 +3,6 @@
 They are evaluated with each change that can make one begin or end; that a time has passed is noticed when it has.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from datetime import datetime, timedelta

@@ -4,8 +4,6 @@ What the tables are is read from their metadata, so that a table that is added i
 tables nothing is copied: jobs that are still open are put into the queue of the copy.
 """
 
-from __future__ import annotations
-
 import sqlite3
 from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager

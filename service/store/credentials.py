@@ -1,7 +1,5 @@
 """Secrets of the sources of cameras, which nobody is shown: all SQL about them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from urllib.parse import urlsplit
 

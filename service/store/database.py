@@ -1,7 +1,5 @@
 """The database: one engine, transactions for reading and for writing, and the schema brought up to date."""
 
-from __future__ import annotations
-
 import json
 import select
 import sqlite3

@@ -3,8 +3,6 @@
 A process ignores the fields of a document that it does not know, and keeps them when it changes a venue.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from pydantic import BaseModel

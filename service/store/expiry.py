@@ -7,8 +7,6 @@ never a row that promises what is not there, never a file that nobody knows.
 The last accepted job of each venue, the one that brought its poses, is past no time, and neither are its pictures.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Collection
 from dataclasses import dataclass

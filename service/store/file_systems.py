@@ -5,8 +5,6 @@ driver, also lose locks. What comes of it are errors now and then and, in the en
 (sqlite.org/wal.html, sqlite.org/howtocorrupt.html).
 """
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

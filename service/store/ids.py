@@ -1,7 +1,5 @@
 """Ids of jobs and events."""
 
-from __future__ import annotations
-
 import os
 import time
 

@@ -1,7 +1,5 @@
 """API keys: how they are made, and all SQL about them. What is stored is a hash; the key itself is seen once."""
 
-from __future__ import annotations
-
 import hashlib
 import secrets
 from collections.abc import Collection, Mapping

@@ -4,8 +4,6 @@ They are copied and backed up with all other tables: by the minutes it is seen w
 report says since when the process is missed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from datetime import datetime, timedelta
@@ -21,10 +19,9 @@ from service.schemas.venue import Venue
 from service.store import live_alarms, tables
 from service.store.database import Repository, clock, lock_venue, reading, writing
 from service.store.documents import to_document
-from service.store.refusals import no_such_venue
 from service.store.statistics.counters import INSERT
 from service.store.unreadable import read_or, read_values
-from service.store.venues import find_venue
+from service.store.venues import existing_venue
 
 RUNNING_WITHIN, LATELY = timedelta(seconds=5), timedelta(days=1)
 # The share of measured pictures in /metrics is over the current minute and the one before it.
@@ -53,10 +50,7 @@ class LiveRepository(Repository):
         """
         with writing(self._engine) as connection:
             lock_venue(connection, venue_id)
-            venue = find_venue(connection, venue_id)
-            if venue is None:
-                raise no_such_venue(venue_id)
-            _require_known_cameras(venue, report)
+            _require_known_cameras(existing_venue(connection, venue_id), report)
             now = clock(connection)
             _keep_newest(connection, venue_id, report, now)
             _add_to_minute(connection, venue_id, report, now)

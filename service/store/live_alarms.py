@@ -4,8 +4,6 @@ The process that sends the poses only reports; what rings is decided by the serv
 SQL about when that is next to be looked at.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
@@ -38,7 +36,7 @@ class WatchedCamera(Schema):
     not_measured_since: datetime | None = None
     late_since: datetime | None = None
 
-    def after(self, camera: LiveCameraIn, now: datetime) -> WatchedCamera:
+    def after(self, camera: LiveCameraIn, now: datetime) -> "WatchedCamera":
         """Return what is watched of the camera after a report."""
         # A camera that is measured in every tenth picture is measured, whatever the last picture was.
         is_measured = camera.status == "measured" or camera.measured > 0

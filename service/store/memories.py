@@ -5,8 +5,6 @@ camera id to memory, and a row belongs to the revision with which the document c
 its nights back too. A venue without a row has no memories yet.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from functools import partial

@@ -5,8 +5,6 @@ engine, on fewer points and a flat pitch. Lenses are OpenCV's own, which takes i
 movement is wanted.
 """
 
-from __future__ import annotations
-
 import math
 from functools import lru_cache
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """Preconditions of a change of a venue (RFC 9110, section 13)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from service.schemas import etags

@@ -1,7 +1,5 @@
 """Problems that requests about venues and jobs are refused with, in the store and in the routes."""
 
-from __future__ import annotations
-
 from service.schemas.history import Revision
 from service.schemas.job import Job
 from service.schemas.problems import Problem

@@ -1,7 +1,5 @@
 """All repositories on one database."""
 
-from __future__ import annotations
-
 from contextlib import AbstractContextManager
 
 from service.store.adoption import AdoptionRepository

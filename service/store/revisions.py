@@ -1,7 +1,5 @@
 """History of venues as revisions, one for every state of their cameras: its pages, and how a venue was at one."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -172,18 +170,13 @@ def _with_state(
     venue: Venue, cameras: list[PosedCamera], ridge: list[list[float]] | None, numbers: dict[str, float]
 ) -> Venue:
     """Return a venue with the poses and lenses of another time, and with the ridge and numbers that belong to them."""
-    then = {camera.id: camera for camera in cameras}
-    restored = [
-        camera.model_copy(
-            update={
-                "pose": then[camera.id].pose,
-                "intrinsics": then[camera.id].intrinsics.with_sigma_of(camera.intrinsics),
-            }
-        )
-        for camera in venue.cameras
-    ]
+    now = {camera.id: camera.intrinsics for camera in venue.cameras}
+    then = {
+        camera.id: {"pose": camera.pose, "intrinsics": camera.intrinsics.with_sigma_of(now[camera.id])}
+        for camera in cameras
+    }
     field = FieldOfPlay.model_validate(venue.field.model_dump() | numbers | {"ridge": ridge})
-    return venue.model_copy(update={"cameras": restored, "field": field})
+    return venue.with_cameras(then, field=field)
 
 
 def _in_words(sizes: dict[str, list[int]]) -> str:

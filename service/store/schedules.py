@@ -7,8 +7,6 @@ There are two lanes. In the slow one are the venues whose cameras gave no frame 
 for each other, and those whose cameras answer never wait for them.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import Any

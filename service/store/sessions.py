@@ -1,7 +1,5 @@
 """Browser sessions and the keys that they began with. A hash is stored; the token itself is in a cookie."""
 
-from __future__ import annotations
-
 import secrets
 from datetime import UTC, datetime, timedelta
 

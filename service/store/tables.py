@@ -1,7 +1,5 @@
 """The tables, and what their columns mean. Those of an earlier version become these by `migrations`."""
 
-from __future__ import annotations
-
 from datetime import UTC, datetime
 from typing import Any
 

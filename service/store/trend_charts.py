@@ -4,8 +4,6 @@ Nights are days of UTC. Where a schedule calibrates many times a day, the mean o
 and lets it cool again, which is no trend.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from datetime import datetime
@@ -76,7 +74,7 @@ class CameraCharts:
     series: Sequence[Series]
 
     @classmethod
-    def of(cls, rows: Rows, settled: Mapping[str, Baseline]) -> CameraCharts:
+    def of(cls, rows: Rows, settled: Mapping[str, Baseline]) -> "CameraCharts":
         """Chart the rows since an anchor, oldest first; `settled`: the baselines that are known for good."""
         nights = [list(several) for _, several in groupby(rows, lambda row: row.at.date())]
         return cls(nights, [_series(quantity, nights, settled.get(quantity)) for quantity in QUANTITIES])
@@ -133,7 +131,7 @@ class CameraCharts:
         if not beyond:
             first = self.nights[0][0].at
             return (
-                f"Camera {camera} has not moved beyond what its own spread explains since {_date(first)} "
+                f"Camera {camera} has not moved beyond what its own spread explains since {date_text(first)} "
                 f"({number + 1} night{'s' if number else ''})."
             )
         of_pose = [series for series in beyond if series.quantity != "focal-length"]
@@ -170,7 +168,7 @@ class CameraCharts:
     def _since(self, several: Sequence[Series]) -> str:
         """Return in words when the first of several quantities began to move."""
         begun = [point.since for point in _last_points(several, len(self.nights) - 1) if point.since is not None]
-        return f"since {_date(self.nights[min(begun, default=0)][0].at)}"
+        return f"since {date_text(self.nights[min(begun, default=0)][0].at)}"
 
     def _which_charts(self, beyond: Sequence[Series]) -> str:
         last = _last_points(beyond, len(self.nights) - 1)
@@ -295,7 +293,8 @@ def _of_known(middle: Callable[[Sequence[float]], float], rows: Rows, column: st
     return middle(known) if known else None
 
 
-def _date(at: datetime) -> str:
+def date_text(at: datetime) -> str:
+    """Return a date in words."""
     return f"{at.day} {at:%B %Y}"
 
 

@@ -1,7 +1,5 @@
 """Trends of cameras: the movement of each since its anchor, job by job, as clients, workers and /metrics read it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from datetime import datetime
 from typing import Any

@@ -5,8 +5,6 @@ reads one row lets `UnreadableRow` pass, and the interface answers with a proble
 `read_each`, and goes on with the others; what is only derived (statistics, memories) begins anew by `read_or`.
 """
 
-from __future__ import annotations
-
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping

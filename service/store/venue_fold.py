@@ -4,8 +4,6 @@ A step takes the changes so far and returns them with its own; `with_alarms` com
 few steps: see `with_result_in_use` for an accepted calibration, `with_venue_put` for a PUT.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -36,6 +34,8 @@ from service.store.trend_charts import chart_columns, no_chart_columns
 from service.store.unreadable import MOST_FAULTS
 from service.store.venue_state import AnchorRow, Changes, NightRow, RevisionRow, StoredVenue, VenueState
 
+# Parts of a camera that a calibration finds, if not all of them.
+CAMERA_PARTS = ("pose", "intrinsics", "light")
 # The nights of each camera that are kept: three years of them.
 KEPT_NIGHTS = 1100
 
@@ -75,21 +75,13 @@ def with_result(venue: Venue, result: Result, cameras: Collection[str] | None = 
 
     `cameras`: only theirs; None: those of all.
     """
-    found = {camera.id: camera for camera in result.cameras if cameras is None or camera.id in cameras}
-    cameras_found = [
-        camera.model_copy(
-            update={
-                "pose": found[camera.id].pose,
-                "intrinsics": found[camera.id].intrinsics or camera.intrinsics,
-                "light": found[camera.id].light or camera.light,
-            }
-        )
-        if camera.id in found
-        else camera
-        for camera in venue.cameras
-    ]
+    found = {
+        camera.id: {part: value for part in CAMERA_PARTS if (value := getattr(camera, part)) is not None}
+        for camera in result.cameras
+        if cameras is None or camera.id in cameras
+    }
     field = venue.field if result.ridge is None else venue.field.model_copy(update={"ridge": result.ridge})
-    return venue.model_copy(update={"cameras": cameras_found, "field": field})
+    return venue.with_cameras(found, field=field)
 
 
 def with_misses(changes: Changes, cameras: Collection[str]) -> Changes:

@@ -5,8 +5,6 @@ Whatever happens to a venue goes this way: a job ends, somebody puts poses or re
 from the beginning (`lock_venue`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
@@ -220,15 +218,15 @@ class Changes:
     counted: Increments = field(default_factory=dict)
     knocked: Mapping[str, str] | None = None
 
-    def with_state(self, **parts: Any) -> Changes:
+    def with_state(self, **parts: Any) -> "Changes":
         """Return the changes with these parts of the state after them."""
         return replace(self, after=replace(self.after, **parts))
 
-    def with_quality(self, **columns: Any) -> Changes:
+    def with_quality(self, **columns: Any) -> "Changes":
         """Return the changes with these columns of the quality after them."""
         return self.with_state(quality=replace(self.after.quality, **columns))
 
-    def with_events(self, *events: NewEvent) -> Changes:
+    def with_events(self, *events: NewEvent) -> "Changes":
         """Return the changes with more events of the venue."""
         return replace(self, events=(*self.events, *events))
 

@@ -1,7 +1,5 @@
 """Venues, their changes and their restoration: all SQL about them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -214,14 +212,13 @@ class VenueRepository(Repository):
                 connection.execute(sa.delete(table).where(table.c.venue == venue_id))
             connection.execute(sa.delete(tables.venues).where(v.id == venue_id))
 
-    def with_credentials(self, venue_id: str) -> tuple[Venue, dict[str, str]] | None:
-        """Return a venue with the encoded secrets of its sources by camera; None without such a venue.
+    def with_credentials(self, venue_id: str) -> tuple[Venue, dict[str, str]]:
+        """Return a venue with the encoded secrets of its sources by camera; raises the problem `venue-not-found`.
 
         Both are read in one transaction, or a password could go to the host that a source was on before.
         """
         with reading(self._engine) as connection:
-            stored = find_stored(connection, venue_id)
-            return None if stored is None else (stored.venue, read_credentials(connection, venue_id))
+            return existing_venue(connection, venue_id), read_credentials(connection, venue_id)
 
     def states_since(self, venue_id: str, number: int) -> tuple[Venue, Venue, int]:
         """Return a venue as it was at a revision and as it is, and the number of its newest revision.
@@ -229,12 +226,10 @@ class VenueRepository(Repository):
         Raises the problems `venue-not-found`, `revision-not-found` and `revision-unfit`.
         """
         with reading(self._engine) as connection:
-            stored = find_stored(connection, venue_id)
-            if stored is None:
-                raise no_such_venue(venue_id)
-            then, revision = state_at(connection, stored.venue, number)
+            venue = existing_venue(connection, venue_id)
+            then, revision = state_at(connection, venue, number)
             newest = newest_revision(connection, venue_id) or revision
-            return then, stored.venue, newest.revision
+            return then, venue, newest.revision
 
     def readable(self, venue_id: str) -> Venue | None:
         """Return a venue, None if there is none or it cannot be read."""
@@ -272,7 +267,6 @@ class VenueRepository(Repository):
 
 
 def _health_of(connection: sa.Connection, venue_id: str) -> VenueHealth | None:
-    """Return the health of a venue, None if there is no such venue."""
     newest = newest_revision(connection, venue_id)
     if newest is None:
         return None
@@ -352,6 +346,14 @@ def find_venue(connection: sa.Connection, venue_id: str) -> Venue | None:
     """Return a venue inside the caller's transaction, None if there is none. Raises `UnreadableRow`."""
     stored = find_stored(connection, venue_id)
     return None if stored is None else stored.venue
+
+
+def existing_venue(connection: sa.Connection, venue_id: str) -> Venue:
+    """Return a venue inside the caller's transaction; raises `UnreadableRow`, and the problem `venue-not-found`."""
+    venue = find_venue(connection, venue_id)
+    if venue is None:
+        raise no_such_venue(venue_id)
+    return venue
 
 
 def _put(

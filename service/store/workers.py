@@ -1,9 +1,7 @@
-"""Heartbeats of the workers: all SQL about them.
+"""Heartbeats of the workers, and the jobs that nothing was heard of since: all SQL about them.
 
 A worker has a row by its name, and each of its starts a token in it: two workers of one name are told apart by that.
 """
-
-from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass
@@ -11,11 +9,15 @@ from datetime import datetime, timedelta
 
 import sqlalchemy as sa
 
+from service.schemas.names import OPEN_STATUSES
 from service.store.database import Repository, clock, reading, writing
-from service.store.silence import CLOCK_TOLERANCE, silent_jobs
-from service.store.tables import workers
+from service.store.tables import jobs, workers
 
-w = workers.c
+j, w = jobs.c, workers.c
+# A sign of life that lies further ahead was given by a clock that has been put right since.
+CLOCK_TOLERANCE = timedelta(seconds=5)
+# Silent jobs that a round looks after.
+BATCH = 100
 
 
 @dataclass(frozen=True)
@@ -154,3 +156,17 @@ def heartbeats(connection: sa.Connection, now: datetime) -> list[WorkerHeartbeat
 
 def _silent_s(seen_at: datetime, now: datetime) -> float | None:
     return None if seen_at > now + CLOCK_TOLERANCE else max(0.0, (now - seen_at).total_seconds())
+
+
+def silent_jobs(connection: sa.Connection, now: datetime, seconds: float, but: Collection[str] = ()) -> list[str]:
+    """Return open jobs that nothing was heard of for a while, or only by a clock that has been put back since.
+
+    `but`: without these.
+    """
+    query = sa.select(j.id).where(j.status.in_(OPEN_STATUSES), unheard_for(seconds, now), j.id.not_in(but))
+    return list(connection.scalars(query.order_by(j.updated_at).limit(BATCH)))
+
+
+def unheard_for(seconds: float, now: datetime) -> sa.ColumnElement[bool]:
+    """Return the condition under which nothing was heard of a job for so long."""
+    return sa.or_(j.updated_at < now - timedelta(seconds=seconds), j.updated_at > now + CLOCK_TOLERANCE)

@@ -129,4 +129,4 @@ def test_nights_after_the_twentieth_do_not_change_what_is_usual():
 
 def test_a_single_night_is_its_own_baseline():
     (point,) = charted(nights([3.0]), Baseline.of(nights([3.0])))
-    assert (point.standardised, point.is_beyond, point.since) == (0.0, False, None)
+    assert (point.ewma, point.is_beyond, point.since) == (0.0, False, None)

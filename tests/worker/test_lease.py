@@ -8,7 +8,7 @@ import sqlalchemy as sa
 
 from service.schemas.job import Progress
 from service.store import tables
-from service.store.silence import silent_jobs
+from service.store.workers import silent_jobs
 from testbed.homes import in_both_homes
 from worker import lease
 from worker.lease import JobTimeoutError, LeaseLostError, Leases

@@ -1,7 +1,5 @@
 """The engine on one page: frames and stored poses in, new poses and verdicts out."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime

@@ -1,7 +1,5 @@
 """The engine's other page: frames without poses in, cameras with verdicts out."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """The joint verdict: cameras that passed the gate, judged against each other."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial

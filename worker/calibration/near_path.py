@@ -5,8 +5,6 @@ search. What it finds has to pass the same gate. That is asked camera by camera:
 one that is fogged is left, and the others need not be.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from worker.calibration.gate.quality import CameraResult

@@ -5,8 +5,6 @@ witness costs: an overview of each frame, which must not show that most of the l
 looks at a frame in full where lines do not suffice.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
@@ -51,7 +49,7 @@ class FrameObserver:
     @classmethod
     def of(
         cls, pitch: Field, cameras: Sequence[Camera], frames: Mapping[str, Sequence[Frame]], segment: Segment
-    ) -> FrameObserver:
+    ) -> "FrameObserver":
         """Measure how the frames of each camera lie beside each other."""
         swayed = {camera.id: sways(frames[camera.id], camera.intrinsics) for camera in cameras}
         return cls(pitch, cameras, frames, swayed, segment)
@@ -82,7 +80,7 @@ class FrameObserver:
         """Return where in the frames of a camera, or in reduced ones, lines can be, as far as its pose may be off."""
         return reachable_regions(self.pitch, camera, CAPTURE_RAD * camera.intrinsics.focal_length_px)
 
-    def reduced(self, width: int) -> FrameObserver:
+    def reduced(self, width: int) -> "FrameObserver":
         """Return the observer of the first frame of each camera, at most so wide."""
         cameras = [camera.resized(min(width, camera.intrinsics.size[0])) for camera in self.cameras]
         frames = {}
@@ -92,7 +90,7 @@ class FrameObserver:
             frames[camera.id] = [np.asarray(small, dtype=np.uint8)]
         return FrameObserver.of(self.pitch, cameras, frames, self.segment)
 
-    def in_colours(self, colours: Array, choices: Sequence[Sequence[int]]) -> list[FrameObserver]:
+    def in_colours(self, colours: Array, choices: Sequence[Sequence[int]]) -> "list[FrameObserver]":
         """Return for each of the `choices` an observer of the first frames that shows only these `colours` of lines.
 
         All frames of a job may fill half of its memory.

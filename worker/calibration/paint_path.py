@@ -8,8 +8,6 @@ all colours most of which lie on its lines then: paint in light and in shade, or
 colour is about as likely with other poses, the frames do not tell, and the field is looked for in all colours.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property

@@ -1,7 +1,5 @@
 """The problem of a calibration and its solution."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
@@ -30,7 +28,7 @@ class ObservedCameras:
     overviews: Sequence[Response | None]
     in_full: Collection[int]
 
-    def of(self, numbers: Sequence[int]) -> ObservedCameras:
+    def of(self, numbers: Sequence[int]) -> "ObservedCameras":
         """Return the observations of some of the cameras."""
         return ObservedCameras(
             [self.views[n] for n in numbers],
@@ -60,7 +58,7 @@ class Problem:
     memories: Sequence[CameraMemory | None]
     recorder: Recorder = NOT_RECORDED
 
-    def of(self, numbers: Sequence[int]) -> Problem:
+    def of(self, numbers: Sequence[int]) -> "Problem":
         """Return the problem of some of the cameras."""
         cameras, memories = [self.cameras[n] for n in numbers], [self.memories[n] for n in numbers]
         return replace(self, cameras=cameras, observed=self.observed.of(numbers), memories=memories)

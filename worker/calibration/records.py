@@ -1,7 +1,5 @@
 """Inputs and outputs of the engine: options, progress, results, errors."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
@@ -99,7 +97,7 @@ class StageTimings:
         self.seconds.setdefault(stage, 0.0)
         self.core_seconds.setdefault(stage, 0.0)
 
-    def add(self, other: StageTimings) -> None:
+    def add(self, other: "StageTimings") -> None:
         """Append the stages of other timings."""
         self.seconds |= other.seconds
         self.core_seconds |= other.core_seconds
@@ -125,7 +123,7 @@ class EngineResult:
         reasons = [f"camera {one.camera.id}: {one.rejected_because}" for one in cameras if one.rejected_because]
         return replace(self, cameras=cameras, rejected_because=in_one_sentence(reasons) or None)
 
-    def accepts_all_of(self, before: EngineResult) -> bool:
+    def accepts_all_of(self, before: "EngineResult") -> bool:
         """True if every camera that the result `before` accepts is accepted here."""
         both = zip(before.cameras, self.cameras, strict=True)
         return all(now.accepted or not then.accepted for then, now in both)
@@ -209,7 +207,7 @@ class ProgressReporter:
         self.stop = stop
         self.fraction = 0.0
 
-    def muted(self) -> ProgressReporter:
+    def muted(self) -> "ProgressReporter":
         """Return a reporter for an attempt that may fail: its time counts, its progress is not reported."""
         muted = ProgressReporter(lambda _: None, self.stop)
         muted.timings = self.timings

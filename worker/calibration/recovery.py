@@ -6,8 +6,6 @@ stored, and holds only if none of them is refused for it. Beyond the gate's limi
 person, or accepted where the venue says so.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """Robust weights and losses of residuals."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -5,8 +5,6 @@ In all colours, or in the paint of one field.
 The cheapest explanation comes first, and the first one that the gate accepts for all cameras is the answer.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Steps of a calibration: search, joint refinement, judgement of each camera."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial

@@ -4,8 +4,6 @@ Asked only of cameras whose lines are not seen where their stored poses put them
 if it passes the gate at that camera's stored pose with that camera's lens, as a frame of its own would.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -54,7 +52,8 @@ def _shown_in(
     own = problem.cameras[number]
     if problem.observed.views[number].figures.lines_found >= MOST_OF_ITS_OWN:
         return None
-    others = [n for n, other in enumerate(problem.cameras) if n != number and _has_frame_size_of(other, own)]
+    size = own.intrinsics.size
+    others = [n for n, other in enumerate(problem.cameras) if n != number and other.intrinsics.size == size]
     with progress.timed("view"):
         views = {n: look_at(frames[own.id][0], problem.pitch, problem.cameras[n]) for n in others}
     for n in sorted(others, key=lambda n: -views[n].figures.lines_found):
@@ -64,10 +63,6 @@ def _shown_in(
         if result.accepted and not _stands_nearer(result, own, problem.cameras[n]):
             return _Shown(n, result.evidence.share)
     return None
-
-
-def _has_frame_size_of(one: Camera, other: Camera) -> bool:
-    return one.intrinsics.size == other.intrinsics.size
 
 
 def _result_as(

@@ -6,8 +6,6 @@ tried on its own. If it passes there, the others get it back once, at the pose f
 fails again, it stays by itself, and the others are refined without it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from types import MappingProxyType
 

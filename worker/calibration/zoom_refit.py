@@ -5,8 +5,6 @@ better one is known. Whether that may be stored is the venue's choice: a lens th
 then something else is wrong.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from worker.calibration.gate.quality import CameraResult, Refusal, zoom_in_words, zoomed_beyond_doubt

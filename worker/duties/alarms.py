@@ -1,7 +1,5 @@
 """Timed alarms, such as a venue that was not calibrated for days. All others begin and end with their events."""
 
-from __future__ import annotations
-
 from service.store.unreadable import UnreadableRow
 from service.store.venues import VenueRepository
 

@@ -1,7 +1,5 @@
 """Detects that a wall clock was set back: times that were computed by it before lie too far ahead."""
 
-from __future__ import annotations
-
 import time
 from datetime import datetime
 

@@ -5,8 +5,6 @@ later (DNS rebinding) leads nowhere. Redirects are not followed and proxies of t
 same reason.
 """
 
-from __future__ import annotations
-
 import socket
 import threading
 from collections.abc import Mapping

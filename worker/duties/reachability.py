@@ -4,8 +4,6 @@ To connect costs a thread that waits, to fetch a process of its own: many hosts 
 is known to be silent nothing is fetched at all for a while.
 """
 
-from __future__ import annotations
-
 import socket
 import threading
 import time

@@ -4,8 +4,6 @@ A round that breaks off anywhere is finished by the next one; two at once (a wor
 twice and no harm.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Collection, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor

@@ -5,8 +5,6 @@ Cameras that give no frame, or take long, wait in a slow lane of their own, so t
 venues are probed at once: most of them by a TCP connection, before a process is started to fetch anything.
 """
 
-from __future__ import annotations
-
 import threading
 import time
 from datetime import UTC, timedelta

@@ -1,7 +1,5 @@
 """A bounded thread pool for work that may take long, so that the duty that submits it goes on meanwhile."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait

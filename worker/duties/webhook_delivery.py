@@ -4,8 +4,6 @@ All three kinds of callbacks (`callback_url` of a job, that of alarms, webhooks 
 take one way: `service.store.events.outbox` adds and claims them, this duty sends them.
 """
 
-from __future__ import annotations
-
 import random
 from collections.abc import Callable
 from datetime import datetime, timedelta

@@ -3,8 +3,6 @@
 github.com/standard-webhooks/standard-webhooks, spec/standard-webhooks.md
 """
 
-from __future__ import annotations
-
 import asyncio
 import base64
 import hashlib

@@ -1,7 +1,5 @@
 """A job of the kind `check`: from a calibration of any origin and frames of its cameras to a grade for each."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -18,9 +16,9 @@ from worker.calibration.checking.grade import GradedCamera, grade
 from worker.calibration.geometry import camera as engine
 from worker.calibration.geometry.lens import Lens
 from worker.compute_resources import ComputeResources
-from worker.jobs.decoding import decode_frame, decode_frame_of_any_size
+from worker.jobs.decoding import decode_frames, size_of
 from worker.jobs.documents import Progress
-from worker.jobs.from_schemas import JobFailedError, Picture, lens_of, pitch_of
+from worker.jobs.from_schemas import JobFailedError, lens_of, pitch_of
 from worker.jobs.to_schemas import (
     Solution,
     engine_failures,
@@ -43,8 +41,8 @@ def solve(
     segmenter = load_segmenter(means)
     cv2.setNumThreads(means.threads)
     warnings: list[str] = []
-    frames = {camera.id: _decode(camera.id, files[camera.id], warnings.append) for camera in given.cameras}
-    cameras = [_given(camera, _size(frames[camera.id][0])) for camera in given.cameras]
+    frames = {camera.id: decode_frames(camera.id, None, files[camera.id], warnings.append) for camera in given.cameras}
+    cameras = [_given(camera, size_of(frames[camera.id][0])) for camera in given.cameras]
     pitch = pitch_of(given.field)
     with engine_failures():
         checked = check_cameras(
@@ -61,17 +59,6 @@ def solve(
         software=means.software,
     )
     return Solution(result, {})
-
-
-def _decode(camera: str, files: Sequence[bytes], remark: Callable[[str], None]) -> list[Picture]:
-    """Return the frames of a camera, all of the size of the first; `remark` is told of what was changed in them."""
-    first = decode_frame_of_any_size(camera, files[0], remark)
-    return [first, *(decode_frame(camera, first.shape[1::-1], file, remark) for file in files[1:])]
-
-
-def _size(frame: Picture) -> tuple[int, int]:
-    height, width = frame.shape[:2]
-    return width, height
 
 
 def _given(camera: CheckedCamera, size: tuple[int, int]) -> GivenCamera:

@@ -1,7 +1,5 @@
 """Debug files of a calibration: what each stage of the engine saw, as pictures and JSON (see docs/debugging.md)."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict

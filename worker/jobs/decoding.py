@@ -1,7 +1,5 @@
 """Files of frames and photos become pictures, a file that is damaged a failed job that names its camera."""
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Callable, Iterator, Sequence
 
@@ -42,12 +40,25 @@ def decode_image(
     return picture
 
 
+def decode_frames(
+    camera: str,
+    image_size: Sequence[int] | None,
+    files: Sequence[bytes],
+    remark: Callable[[str], None] = no_remark,
+) -> list[Picture]:
+    """Return the frames of a camera, all of one size: the camera's, or if nobody has said one, that of the first."""
+    if image_size is not None:
+        return [decode_frame(camera, image_size, file, remark) for file in files]
+    first = decode_frame_of_any_size(camera, files[0], remark)
+    return [first, *decode_frames(camera, size_of(first), files[1:], remark)]
+
+
 def decode_frame(
     camera: str, image_size: Sequence[int], file: bytes, remark: Callable[[str], None] = no_remark
 ) -> Picture:
     """Return a BGR frame (height, width, 3) of the size of the intrinsics; `remark` is told if it was resized to it."""
     frame = decode_frame_of_any_size(camera, file, remark)
-    size = frame.shape[1], frame.shape[0]
+    size = size_of(frame)
     if [*size] == [*image_size]:
         return frame
     if not is_resized(size, image_size):
@@ -65,6 +76,12 @@ def decode_frame_of_any_size(camera: str, file: bytes, remark: Callable[[str], N
     except DamagedPictureError as damage:
         detail = f"A frame of camera {camera} is of no use: {damage}; grab it again."
         raise JobFailedError("broken-image", detail, camera) from None
+
+
+def size_of(frame: Picture) -> tuple[int, int]:
+    """Return width and height of a picture."""
+    height, width = frame.shape[:2]
+    return width, height
 
 
 def _decode_png(subject: str, file: bytes, grey: bool, remark: Callable[[str], None]) -> Picture | None:
@@ -94,7 +111,6 @@ def _require_memory(file: bytes) -> None:
 
 
 def _without_animation(png: bytes) -> Iterator[bytes]:
-    """Yield the parts of a PNG that are not of its animation."""
     yield PNG_START
     position = len(PNG_START)
     while position + 12 <= len(png):

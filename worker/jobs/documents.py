@@ -4,8 +4,6 @@ The models take longer to load than a near job takes to refine a camera. The par
 sends by the models, and checks by them what the program answers.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Collection, Mapping
 from datetime import datetime
@@ -45,7 +43,7 @@ class Document(dict[str, Any]):
         except KeyError:
             raise AttributeError(name) from None
 
-    def model_copy(self, *, update: Mapping[str, Any]) -> Document:
+    def model_copy(self, *, update: Mapping[str, Any]) -> "Document":
         """Return the document with other members."""
         return Document({**self, **update})
 
@@ -66,7 +64,7 @@ def parse(text: str | bytes) -> Any:
     return json.loads(text, object_hook=Document)
 
 
-def parse_task(document: Document) -> Task:
+def parse_task(document: Document) -> "Task":
     """Return the task of a request."""
     taken_at = document.taken_at and datetime.fromisoformat(document.taken_at)
     return cast("Task", document.model_copy(update={"taken_at": taken_at}))

@@ -1,7 +1,5 @@
 """A job of the kind `field`: from frames of several cameras to the measures of their pitch, and pictures of both."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable, Mapping, Sequence
 

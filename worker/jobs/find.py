@@ -1,7 +1,5 @@
 """A job of the kind `find`: from frames of cameras without poses to these cameras, and a picture of each candidate."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
@@ -31,7 +29,7 @@ from worker.calibration.relocalisation.sought import (
 )
 from worker.calibration.rendering.overlays import candidate_picture
 from worker.compute_resources import ComputeResources
-from worker.jobs.decoding import decode_frame, decode_frame_of_any_size
+from worker.jobs.decoding import decode_frames, size_of
 from worker.jobs.documents import Progress, Provenance
 from worker.jobs.from_schemas import (
     Picture,
@@ -72,12 +70,12 @@ def solve(
     cv2.setNumThreads(means.threads)
     remarks: dict[str, list[str]] = {camera.id: [] for camera in site.cameras}
     frames = {
-        camera.id: _decode(camera, files[camera.id], remarks[camera.id].append)
+        camera.id: decode_frames(camera.id, camera.image_size, files[camera.id], remarks[camera.id].append)
         for camera in site.cameras
         if camera.id in files
     }
     pitch = pitch_of(site.field)
-    sought = [sought_camera(one, _size(frames[one.id][0])) for one in site.cameras if one.pose is None]
+    sought = [sought_camera(one, size_of(frames[one.id][0])) for one in site.cameras if one.pose is None]
     known = [_known(camera) for camera in site.cameras if camera.pose is not None]
     with engine_failures():
         found = find_cameras(
@@ -90,19 +88,6 @@ def solve(
     }
     provenance = provenance_of(means, segmenter, seed, {"seed": seed})
     return Solution(_result(found, pitch, site, sought, provenance, remarks), pictures)
-
-
-def _decode(camera: SoughtCameraIn, files: Sequence[bytes], remark: Callable[[str], None]) -> list[Picture]:
-    """The frames of a camera, all of one size: the camera's, or if nobody has said one, that of the first."""
-    if camera.image_size is not None:
-        return [decode_frame(camera.id, camera.image_size, file, remark) for file in files]
-    first = decode_frame_of_any_size(camera.id, files[0], remark)
-    return [first, *(decode_frame(camera.id, first.shape[1::-1], file, remark) for file in files[1:])]
-
-
-def _size(frame: Picture) -> tuple[int, int]:
-    height, width = frame.shape[:2]
-    return width, height
 
 
 def sought_camera(camera: SoughtCameraIn, size: tuple[int, int]) -> SoughtCamera:

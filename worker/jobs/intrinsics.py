@@ -1,7 +1,5 @@
 """A job of the kind `intrinsics`: from the files of photos to a lens and the picture of what it rests on."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Mapping
 from importlib.metadata import version

@@ -7,8 +7,6 @@ the others. Blocks are coded as differences to the block before: what is lost in
 too dark or too colourful, and where that begins, a step runs along the edges of blocks for just one row's length.
 """
 
-from __future__ import annotations
-
 import re
 import struct
 from collections.abc import Callable, Iterator

@@ -1,7 +1,5 @@
 """A job of the kind `locate`: from clicked points to a first pose and the picture that shows it."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace

@@ -5,8 +5,6 @@ differ: a camera whose points refute its own lens and hold with another's, and t
 alike cannot be told apart here, only by stored poses (`worker.jobs.locate`).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from itertools import combinations

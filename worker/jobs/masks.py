@@ -1,7 +1,5 @@
 """Pictures of what the network saw of each frame, which nothing else can tell later."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -17,11 +15,11 @@ FRAME_WIDTH = 1920
 
 def masks(cameras: Sequence[Camera], responses: Mapping[str, NDArray[np.float32]]) -> dict[str, bytes]:
     """Draw the network's responses (h, w), in 0..1, to be laid over the frames."""
-    return {
-        f"mask_{camera.id}": encode_png(mask_layer(_in_bytes(response), size_as_shown(camera, response.shape[1])))
-        for camera in cameras
-        for response in [responses[camera.id]]
-    }
+    files = {}
+    for camera in cameras:
+        in_bytes = np.rint(255 * responses[camera.id]).astype(np.uint8)
+        files[f"mask_{camera.id}"] = encode_png(mask_layer(in_bytes, size_as_shown(camera, in_bytes.shape[1])))
+    return files
 
 
 def size_as_shown(camera: Camera, largest: int = FRAME_WIDTH) -> tuple[int, int]:
@@ -29,8 +27,3 @@ def size_as_shown(camera: Camera, largest: int = FRAME_WIDTH) -> tuple[int, int]
     width, height = camera.intrinsics.size
     shown = min(width, largest, FRAME_WIDTH)
     return shown, round(height * shown / width)
-
-
-def _in_bytes(response: NDArray[np.float32]) -> NDArray[np.uint8]:
-    """A response (h, w) in 0..1 as 0..255."""
-    return np.rint(255 * response).astype(np.uint8)

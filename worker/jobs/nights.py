@@ -4,8 +4,6 @@ The pose of a result belongs to the lens that the venue has. The refined one bel
 those of tonight and those of the camera's memory together.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from datetime import datetime

@@ -1,7 +1,5 @@
 """The pictures of a calibration, by which a person judges it."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor

@@ -1,7 +1,5 @@
 """Plans of installations: from a site with cameras that are not mounted yet to sigmas, maps and warnings."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isfinite

@@ -9,8 +9,6 @@ Nearly every job is a calibration near its stored poses, and begins this program
 needs and no models of the wire: its parent has checked the request, and checks the answer. Other kinds load the models.
 """
 
-from __future__ import annotations
-
 import json
 import logging
 import math
@@ -148,7 +146,7 @@ def _compute_by_models(
             raise AssertionError(task.kind)
 
 
-def _site_of(task: Task, options: FindOptions, files: Mapping[str, Sequence[bytes]]) -> SoughtSite:
+def _site_of(task: "Task", options: "FindOptions", files: Mapping[str, Sequence[bytes]]) -> "SoughtSite":
     """Return the site whose cameras are to be found: the one that was sent, or the stored venue."""
     from service.schemas.find import SoughtSite
 

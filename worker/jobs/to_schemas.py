@@ -1,7 +1,5 @@
 """Conversion of the engine's answers to documents of the wire, and other parts that the kinds of jobs share."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -173,7 +171,7 @@ def camera_to_schema(found: quality.CameraResult) -> CameraResult:
         residual_px=finite_or_none(found.residual_px),
         markings=[_marking(one) for one in found.markings],
         knocked=found.knocked,
-        proposed=_proposal(found) if _is_proposed(found) else None,
+        proposed=_proposal(found),
         cross_check=_cross_check(found.cross_checked()),
     )
 
@@ -182,11 +180,9 @@ def _moved(found: quality.Moved) -> Moved:
     return Moved(rotation_deg=found.rotation_deg, position_m=found.position_m, pixels=finite_or_none(found.pixels))
 
 
-def _is_proposed(found: quality.CameraResult) -> bool:
-    return found.refusal is not None and found.refusal.reason == "knocked"
-
-
-def _proposal(found: quality.CameraResult) -> Proposal:
+def _proposal(found: quality.CameraResult) -> Proposal | None:
+    if found.refusal is None or found.refusal.reason != "knocked":
+        return None
     return Proposal(
         pose=pose_to_schema(found.camera.pose),
         sigma=sigma_to_schema(found.sigma, found.ground_sigma),
@@ -195,7 +191,7 @@ def _proposal(found: quality.CameraResult) -> Proposal:
     )
 
 
-def displacement_to_schema(pitch: Field, found: quality.CameraResult, anchor: Anchor | None) -> Displacement | None:
+def displacement_to_schema(pitch: Field, found: quality.CameraResult, anchor: "Anchor | None") -> Displacement | None:
     """Return the displacement of a camera from its anchor, or from itself without one; None if it is unknown."""
     reference = found.camera if anchor is None else camera_of(anchor.posed)
     moved = measure_displacement(pitch, reference, found)

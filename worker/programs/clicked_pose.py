@@ -4,8 +4,6 @@
 leaves a `ClickedPose`.
 """
 
-from __future__ import annotations
-
 import sys
 import time
 from math import isfinite
@@ -14,7 +12,7 @@ from service import child_process
 from service.schemas.programs.clicked_pose import ClickedPose, ClickedPoseRequest, Polyline
 from worker.calibration.geometry.camera import Camera, inside
 from worker.calibration.geometry.field import Field
-from worker.calibration.rendering.overlays import outline
+from worker.calibration.rendering.overlays import centre_lines
 from worker.jobs.from_schemas import JobFailedError, lens_of, pitch_of
 from worker.jobs.locate import clicks_of, pose_of, result_of
 
@@ -49,9 +47,7 @@ def _lines(pitch: Field, camera: Camera) -> list[Polyline]:
     """Return each marking in pixels, broken where the camera does not see it."""
     lines: list[Polyline] = []
     width, _ = camera.intrinsics.size
-    for marking in pitch.markings():
-        centre, *_ = outline(marking)
-        places = camera.project(pitch.lift(centre))
+    for places in centre_lines(pitch, camera):
         seen = inside(places, camera.intrinsics.size, margin=-BESIDE * width)
         piece: Polyline = []
         for number, (place, visible) in enumerate(zip(places.round(1).tolist(), seen, strict=True)):

@@ -1,10 +1,8 @@
 """Pictures of a calibration when somebody looks at them, in a process of its own.
 
-`python -m worker.programs.draw`. What comes is a `DrawingRequest` and frames, what leaves a
-`Drawn` and the pictures.
+`python -m worker.programs.draw`. What comes is a `DrawingRequest` and frames, what leaves the pictures, without those
+that cannot be drawn.
 """
-
-from __future__ import annotations
 
 import logging
 import sys
@@ -15,14 +13,8 @@ from typing import cast
 import cv2
 
 from service import child_process
-from service.schemas.programs.drawing import (
-    DrawingRequest,
-    DrawnPictures,
-    FieldAndCameras,
-    MarkingToDraw,
-    decode_files,
-    encode_message,
-)
+from service.schemas.programs.drawing import DrawingRequest, FieldAndCameras, MarkingToDraw
+from service.schemas.programs.files import ProgramMessage
 from worker.calibration.diagnostics.markings import OPPOSITE, Direction, MarkingReport
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.field import Field
@@ -35,12 +27,10 @@ def main() -> None:
     """Read the frames, write the pictures."""
     child_process.begin_decoder()
     logging.basicConfig()
-    data = sys.stdin.buffer.read()
-    request = DrawingRequest.model_validate_json(data[: data.index(b"\n")])
+    request, files = DrawingRequest.decode(sys.stdin.buffer.read())
     cv2.setNumThreads(request.threads)
-    pictures = draw(scene_of(request, decode_files(request.sizes, data)), request.names)
-    drawn = DrawnPictures(sizes={name: len(picture) for name, picture in pictures.items()})
-    sys.stdout.buffer.write(encode_message(drawn, pictures))
+    pictures = draw(scene_of(request, files), request.names)
+    sys.stdout.buffer.write(ProgramMessage().encode(pictures))
 
 
 def scene_of(request: DrawingRequest, files: Mapping[str, bytes]) -> PictureInputs:

@@ -1,7 +1,5 @@
 """EXR files; they need the package's extra `exr`."""
 
-from __future__ import annotations
-
 import os
 import sys
 import tempfile

@@ -3,8 +3,6 @@
 `python -m worker.programs.plan`.
 """
 
-from __future__ import annotations
-
 import sys
 from base64 import b64encode
 

@@ -4,8 +4,6 @@
 and prints a `SourceAnswer` per camera as it comes.
 """
 
-from __future__ import annotations
-
 import asyncio
 import os
 import sys
@@ -133,7 +131,7 @@ def _failure(relay: Relay, task: SourceTask, begun: float, otherwise: str) -> Ca
     return CameraError(relay.why or (f"it gave no frame within {task.seconds:g} s" if is_late else otherwise))
 
 
-def _pass_by_first_frames(stream: cv2.VideoCapture) -> None:
+def _pass_by_first_frames(stream: "cv2.VideoCapture") -> None:
     import cv2
 
     codec = int(stream.get(cv2.CAP_PROP_FOURCC)).to_bytes(4, "little").decode("latin-1").lower()

@@ -4,8 +4,6 @@
 bottom for Nuke and Flame and from the top for Unreal.
 """
 
-from __future__ import annotations
-
 import sys
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Answers to a camera that asks for user and password: Basic (RFC 7617) and Digest (RFC 7616, and 2069 before it)."""
 
-from __future__ import annotations
-
 import hashlib
 import re
 import secrets

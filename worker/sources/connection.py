@@ -4,8 +4,6 @@ Cameras mostly sign their certificates themselves. The address of such a camera 
 `rtsps://10.1.0.7/main#tls_sha256=9f86d0...`: that certificate is accepted then, and no other.
 """
 
-from __future__ import annotations
-
 import asyncio
 import hashlib
 import re

@@ -4,8 +4,6 @@ By a reader of its own: httpx refuses what the firmware of cameras writes into h
 Nothing of a camera's answer is followed: a redirect is refused with where it leads.
 """
 
-from __future__ import annotations
-
 import asyncio
 import http.client
 import mimetypes

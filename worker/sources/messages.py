@@ -4,8 +4,6 @@ Heads are read as browsers read them: lines without a name, spaces before the co
 show no picture.
 """
 
-from __future__ import annotations
-
 import asyncio
 import re
 from dataclasses import dataclass, replace
@@ -61,7 +59,7 @@ class Message:
         """The values of a header."""
         return [value for key, value in self.headers if key.lower() == name.lower()]
 
-    def having(self, name: str, value: str) -> Message:
+    def having(self, name: str, value: str) -> "Message":
         """Return the message with one header of this name."""
         others = [(key, kept) for key, kept in self.headers if key.lower() != name.lower()]
         return replace(self, headers=(*others, (name, value)))

@@ -5,8 +5,6 @@ dashes than announced, parts of text come first, lengths are wrong by some bytes
 (ISO/IEC 15948, clause 5) tell by themselves where they begin and end, so nothing else is asked.
 """
 
-from __future__ import annotations
-
 import re
 import struct
 

@@ -6,8 +6,6 @@ The relay connects to the address that was checked, signs the requests that the 
 any redirect for the end.
 """
 
-from __future__ import annotations
-
 import asyncio
 import secrets
 import threading
@@ -60,7 +58,7 @@ class Relay:
         self._here = ""
         self._why: str | None = None
 
-    def __enter__(self) -> Relay:
+    def __enter__(self) -> "Relay":
         self._thread.start()
         if not self._listening.wait(STARTING_S):
             raise OSError("the relay of a stream did not start")

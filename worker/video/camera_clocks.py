@@ -4,8 +4,6 @@ A stream's pictures are dropped until all cameras have reported, so that none of
 of all is Unix time, in seconds since the streams were opened.
 """
 
-from __future__ import annotations
-
 import threading
 import time
 from collections.abc import Iterable

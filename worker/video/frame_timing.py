@@ -1,7 +1,5 @@
 """Choice of the picture of each clip nearest to a moment; pictures are read ahead by a thread."""
 
-from __future__ import annotations
-
 import queue
 import threading
 from collections.abc import Iterator
@@ -72,7 +70,7 @@ class ClipTrack:
     interval_s: float
     live: bool = False
     repeated: int = field(default=0, init=False)
-    sound: list[Packet[AudioStream]] = field(default_factory=list, init=False)
+    sound: "list[Packet[AudioStream]]" = field(default_factory=list, init=False)
     _now: ClipPicture | None = field(default=None, init=False)
     _next: ClipPicture | None = field(default=None, init=False)
 

@@ -4,8 +4,6 @@ A picture that comes while an earlier one is looked at takes the place of others
 whose pictures change their size, is opened again.
 """
 
-from __future__ import annotations
-
 import math
 import threading
 import time
@@ -296,7 +294,7 @@ class StreamTracker:
             )
         return self._is_clock_right
 
-    def _locate(self, clip: Clip, arrived: _ArrivedPicture) -> _Track | None:
+    def _locate(self, clip: Clip, arrived: _ArrivedPicture) -> "_Track | None":
         """Find the camera in a picture, near to where it is stored."""
         stored, rate = self.stored, clip.facts.rate
         camera = camera_for_clip(stored, clip)

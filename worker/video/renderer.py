@@ -7,8 +7,6 @@ its share of the blend and what its lens takes from the corners. Light is put on
 resolution of chroma; what that does to luma is looked up for grey, and the little that its colour adds is carried over.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -81,7 +79,9 @@ class Renderer:
         """End the threads."""
         self._pool.shutdown()
 
-    def _make(self, strip: _Strip, maps: Sequence[_Maps], levels: Sequence[Mapping[int, Planes]], onto: Planes) -> None:
+    def _make(
+        self, strip: "_Strip", maps: "Sequence[_Maps]", levels: Sequence[Mapping[int, Planes]], onto: Planes
+    ) -> None:
         rows, half_rows = strip.rows, _halved(strip.rows)
         here = onto[0][rows], onto[1][half_rows], onto[2][half_rows]
         if strip.unseen:
@@ -114,7 +114,7 @@ class _View:
     falloff: float
 
     @classmethod
-    def of(cls, part: Contribution) -> _View:
+    def of(cls, part: Contribution) -> "_View":
         light: Light = part.light
         tones = light.tones
         grey = np.clip((np.arange(256) - BLACK) * 255 / 219, 0, 255)

@@ -4,8 +4,6 @@ Every sensor has noise, so two pictures of a camera that works differ. Where enc
 the same as the one before; nearly all of them for a second are not.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -5,8 +5,6 @@ beside what its decoder keeps, and three views wait for the encoder. Live stream
 cameras, where all of them tell these by RTCP, and else, as files are, by what moves in their pictures.
 """
 
-from __future__ import annotations
-
 import os
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -235,7 +233,7 @@ def stitch(
 
 
 def _rendered(
-    moments: ClipMoments, geometry: Geometry, size: tuple[int, int], writer: Writer, threads: int
+    moments: "ClipMoments", geometry: Geometry, size: tuple[int, int], writer: Writer, threads: int
 ) -> Iterator[Panorama]:
     """Make and write the view of each moment, which `moments` counts; yield its panorama."""
     import av
@@ -294,7 +292,7 @@ class ClipMoments:
             )
         return pictures
 
-    def sound(self) -> list[Packet[AudioStream]]:
+    def sound(self) -> "list[Packet[AudioStream]]":
         """Return the sound since the last call."""
         packets = []
         for track in self.tracks.values():
@@ -340,7 +338,6 @@ def _check_cameras(scene: StitchScene, addresses: Mapping[str, str], plan: Plan)
 
 
 def _sound_clip(clips: Mapping[str, Clip], wanted: str | None) -> Clip | None:
-    """Return the clip whose sound is kept."""
     if wanted == SILENT:
         return None
     if wanted is None:

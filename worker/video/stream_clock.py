@@ -6,8 +6,6 @@ counts on from the last report and attaches the wall-clock time to the packets o
 streams of other kinds, there is none.
 """
 
-from __future__ import annotations
-
 import math
 import struct
 from dataclasses import dataclass
@@ -53,7 +51,7 @@ class StreamClock:
     """Wall clock of the stream's time 0, nanoseconds since 1970."""
     _has_reported: bool = False
 
-    def learn(self, packet: Packet[Any]) -> None:
+    def learn(self, packet: "Packet[Any]") -> None:
         """Take what a packet says of the wall clock, if it says anything."""
         from av.packet import PacketSideData
 

@@ -5,8 +5,6 @@ each camera; what changes in all cells at once is taken out, since encoders refr
 own and lamps flicker. The lag at which the signals of all cells are most alike is the offset.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Cameras that shake while they film: the view stands still, the maps follow where the lines say that they are."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -50,7 +48,7 @@ class TrackedGeometryFactory:
 
     def __call__(
         self, pitch: Field, view: StitchedView, cameras: Sequence[Camera], lights: Mapping[str, Light], rate: Fraction
-    ) -> _TrackedGeometry:
+    ) -> "_TrackedGeometry":
         """Return the geometry of these cameras."""
         self._moving = _TrackedGeometry(pitch, view, cameras, lights, rate, self._every, self._note)
         return self._moving

@@ -5,8 +5,6 @@ those who ask for one camera share a frame, and all of them together leave turns
 with 503 where they find none (`Snapshots`). A larger scope for looking would break what keys of `read` may do.
 """
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import Mapping
 from weakref import WeakValueDictionary

@@ -1,7 +1,5 @@
 """First poses while somebody clicks points of the pitch in a frame: no job, no venue, nothing stored."""
 
-from __future__ import annotations
-
 from service.api.programs.program_pool import ProgramPool
 from service.schemas.programs.clicked_pose import ClickedPose, ClickedPoseRequest
 from service.settings import Settings

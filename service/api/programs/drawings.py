@@ -5,8 +5,6 @@ hold up every other request. Several API processes may draw the same picture at 
 the same name.
 """
 
-from __future__ import annotations
-
 import asyncio
 from contextlib import suppress
 from weakref import WeakValueDictionary
@@ -14,7 +12,8 @@ from weakref import WeakValueDictionary
 from starlette.concurrency import run_in_threadpool
 
 from service.api.programs.program_pool import ProgramPool, run_program, turn_of
-from service.schemas.programs.drawing import DrawingRequest, DrawnPictures, decode_files, encode_message
+from service.schemas.programs.drawing import DrawingRequest
+from service.schemas.programs.files import ProgramMessage
 from service.settings import Settings
 from service.store.blobs import Blobs, DamagedBlob
 from service.store.jobs.files import drawn_together, picture_file, pictures_folder, source_file
@@ -52,10 +51,10 @@ class Drawings:
         if job is None or None in frames.values():
             return None
         files = {camera: frame for camera, frame in frames.items() if frame is not None}
-        asked = DrawingRequest.of(job.venue, job.result, drawn_together(name), self._settings.threads, files)
+        asked = DrawingRequest.of(job.venue, job.result, drawn_together(name), self._settings.threads)
         program, environment = self._settings.picture_program, self._settings.native_environment
-        output = run_program("picture", program, environment, encode_message(asked, files), LONGEST_S)
-        drawn = decode_files(DrawnPictures.model_validate_json(output[: output.index(b"\n")]).sizes, output)
+        output = run_program("picture", program, environment, asked.encode(files), LONGEST_S)
+        _, drawn = ProgramMessage.decode(output)
         for each, picture in drawn.items():
             self._blobs.put(f"{pictures.folder}/{picture_file(each)}", picture)
         self._forget_if_gone(job_id)

@@ -1,7 +1,5 @@
 """Plans of cameras before they are mounted: no job, no venue, nothing stored."""
 
-from __future__ import annotations
-
 from service.api.programs.program_pool import ProgramPool
 from service.schemas.programs.planning import PlanRequest
 from service.settings import Settings

@@ -1,7 +1,5 @@
 """Runs of programs that compute answers to requests at once."""
 
-from __future__ import annotations
-
 import asyncio
 import os
 import subprocess

@@ -4,8 +4,6 @@ A package takes seconds of a core, and any key may ask for one. Of each key one 
 asks again and again does not keep the others out.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from service.api.programs.program_pool import ProgramPool
@@ -51,11 +49,10 @@ class Stitches:
         if owner in self._owners:
             why = "Another package of this key is being made."
             raise Problem("unavailable", why, headers={"Retry-After": "5"})
-        given = asked.model_dump_json().encode() + b"\n"
         program, environment = self._settings.stitch_program, self._settings.native_environment
         self._owners.add(owner)
         try:
-            return await self._packages.run(program, environment, given)
+            return await self._packages.run(program, environment, asked.encode({}))
         finally:
             self._owners.remove(owner)
 
@@ -67,8 +64,6 @@ class Stitches:
             "width_px": small,
             "height_px": None if height is None else max(2, 2 * round(height * small / width / 2)),
         }
-        sizes = {camera: len(frame) for camera, frame in frames.items()}
-        smaller = asked.model_copy(update={"view": asked.view.but(changes), "sizes": sizes})
-        given = b"".join((smaller.model_dump_json().encode(), b"\n", *frames.values()))
+        smaller = asked.model_copy(update={"view": asked.view.but(changes)})
         program, environment = self._settings.stitch_program, self._settings.native_environment
-        return await self._previews.run(program, environment, given)
+        return await self._previews.run(program, environment, smaller.encode(frames))

@@ -4,8 +4,6 @@ other keys.
 The owner of a venue sees that somebody else changed it, and can ask the operator, whose keys name everybody.
 """
 
-from __future__ import annotations
-
 from contextvars import ContextVar
 from typing import TypeVar
 

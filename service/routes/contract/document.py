@@ -1,7 +1,5 @@
 """The OpenAPI document: names of schemas by direction, webhooks, problems by route."""
 
-from __future__ import annotations
-
 import json
 import re
 from typing import Any

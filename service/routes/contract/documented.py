@@ -1,7 +1,5 @@
 """Uploads, headers and scopes in the OpenAPI document."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Export of poses to the formats of other tools, for venues and jobs."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass
 from importlib.metadata import version
@@ -18,7 +16,6 @@ from service.schemas.names import ID_PATTERN, FormatName, LensChoice
 from service.schemas.problems import Problem
 from service.schemas.results import Refined
 from service.schemas.venue import Venue
-from service.store.adoption import with_refined
 from service.store.refusals import no_refined_pose
 
 # Entries for `responses=`: media types of exported documents.
@@ -81,7 +78,7 @@ def with_refined_poses(venue: Venue, refined: dict[str, Refined], camera: str | 
     lacking = [shot.id for shot in _numbered_cameras(venue, camera) if shot.id not in refined]
     if lacking:
         raise no_refined_pose(lacking[0], f"{why_none} Or ask for lens=stored.")
-    return with_refined(venue, refined)
+    return venue.with_cameras({each: {"pose": of.pose, "intrinsics": of.intrinsics} for each, of in refined.items()})
 
 
 def _numbered_cameras(venue: Venue, camera: str | None) -> list[NumberedCamera]:

@@ -1,7 +1,5 @@
 """Limits of streams of server-sent events: their number and duration."""
 
-from __future__ import annotations
-
 from collections.abc import AsyncIterator
 
 from fastapi import Depends

@@ -1,7 +1,5 @@
 """Routes that check the scope that their documentation names."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Coroutine
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Introduction of the OpenAPI document: frames of reference, order of steps, and groups of routes."""
 
-from __future__ import annotations
-
 DESCRIPTION = """\
 Frames of fixed cameras around a sports field go in, their poses come out.
 

@@ -1,7 +1,5 @@
 """Pages of lists: the `Link` header to the next one, beside `next_cursor`."""
 
-from __future__ import annotations
-
 from typing import Any
 from urllib.parse import urlencode
 

@@ -1,7 +1,5 @@
 """Problems in the OpenAPI document: the types that each route can answer, by status."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from http import HTTPStatus
 from typing import Any

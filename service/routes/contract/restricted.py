@@ -5,8 +5,6 @@ All other routes are closed to them, also those that are added later. A venue th
 answered with 403: the OpenAPI document shows to everybody that it exists.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Annotated, Any, TypeVar
 

@@ -1,11 +1,10 @@
 """Responses with entity tags: clients that have the content get 304 without it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Annotated, Any
 
 from fastapi import Header, Response
+from pydantic import BaseModel
 
 from service.routes.contract.documented import header_docs
 from service.schemas import etags
@@ -31,6 +30,7 @@ def tagged_response(
     return answer
 
 
-def json_response(body: bytes) -> Callable[[], Response]:
-    """Return a function that makes a JSON response of a body."""
-    return lambda: Response(body, media_type="application/json")
+def tagged_json(content: BaseModel, if_none_match: str | None, status: int = 200) -> Response:
+    """Return content as JSON, or 304."""
+    body = content.model_dump_json().encode()
+    return tagged_response(body, if_none_match, lambda: Response(body, status, media_type="application/json"))

@@ -1,7 +1,5 @@
 """Submission of checks: the calibration of any tool and frames of its cameras become a job that grades it."""
 
-from __future__ import annotations
-
 from fastapi import APIRouter, Request, Response
 from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import FormData, UploadFile
@@ -49,10 +47,8 @@ async def submit_check(request: Request, context: InContext, sender: FromSender)
     Read are all formats of `esc convert`, files of a tool that writes one for each camera as well. No venue is needed,
     and none is changed.
     """
-    await run_in_threadpool(forms.require_disk_space, context)
-    await run_in_threadpool(job_submission.require_queue_room, context, None, "check", sender)
     most = MOST_CALIBRATION_FILES + MOST_CAMERAS * context.settings.max_frames_per_camera
-    async with forms.parsed_upload(request, context, most) as form:
+    async with forms.parsed_upload(request, context, None, "check", sender, most) as form:
         return await run_in_threadpool(_submit, context, form, sender)
 
 

@@ -1,7 +1,5 @@
 """Submission of searches: frames of cameras without poses become a job that finds these cameras."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 
 from fastapi import APIRouter, Request, Response
@@ -61,10 +59,8 @@ async def submit_camera_search(
     The result has candidates of each camera with pose and lens, and `candidate/{camera}/{number}.jpg` shows them.
     Nothing is stored by itself: `POST /venues/{id}/adopt-found` creates the venue or moves its cameras.
     """
-    await run_in_threadpool(forms.require_disk_space, context)
-    await run_in_threadpool(job_submission.require_queue_room, context, venue_id, "find", sender)
     most = MOST_CAMERAS * context.settings.max_frames_per_camera
-    async with forms.parsed_upload(request, context, most) as form:
+    async with forms.parsed_upload(request, context, venue_id, "find", sender, most) as form:
         return await run_in_threadpool(_submit, context, venue_id, form, sender)
 
 
@@ -82,7 +78,6 @@ def _submit(context: Context, venue_id: str, form: FormData, sender: Sender) -> 
 
 
 def _sought_of_venue(stored: Venue, form: FormData, options: FindOptions) -> Collection[str]:
-    """Return the cameras of a stored venue that are to be found."""
     # A camera may be called so, and its frame then is.
     if SITE_PART in form and SITE_PART not in stored.poses:
         raise venue_is_stored(stored.id)

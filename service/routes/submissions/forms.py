@@ -1,7 +1,5 @@
 """Upload forms: checks before they are read, their options and their frames."""
 
-from __future__ import annotations
-
 import json
 from collections import Counter
 from collections.abc import AsyncIterator, Collection
@@ -10,6 +8,7 @@ from typing import TypeVar
 
 from fastapi import Request
 from pydantic import ValidationError
+from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import FormData, UploadFile
 
 from service.api.body_limit import is_form
@@ -17,15 +16,15 @@ from service.api.context import Context
 from service.api.problems import validation_problem
 from service.api.spool import Spool, parsed_form
 from service.intake import image_checks
+from service.routes.submissions.job_submission import Sender, require_queue_room
 from service.schemas.base import Schema
 from service.schemas.events import callback_urls
 from service.schemas.find import SoughtSite
-from service.schemas.names import OPTIONS_PART
+from service.schemas.names import OPTIONS_PART, JobKind
 from service.schemas.options import Handling
 from service.schemas.problems import Problem
 from service.schemas.venue import Venue
 from service.settings import Settings
-from service.store.refusals import no_such_venue
 
 LONGEST_OPTIONS = 64 * 1024
 PARTS_TOO_MANY = 100
@@ -54,31 +53,22 @@ def require_disk_space(context: Context) -> None:
         )
 
 
-def venue_for_upload(context: Context, venue_id: str) -> Venue:
-    """Return the venue of an upload; raises a problem before it is read if there is no room for it."""
-    stored = context.venues.get(venue_id)
-    if stored is None:
-        raise no_such_venue(venue_id)
-    require_disk_space(context)
-    return stored
-
-
 @asynccontextmanager
-async def parsed_upload(request: Request, context: Context, most_files: int) -> AsyncIterator[FormData]:
-    """Yield the form of a request, with so many files at most; a few too many get the answer that names them.
+async def parsed_upload(
+    request: Request, context: Context, venue_id: str | None, kind: JobKind, sender: Sender, most_files: int
+) -> AsyncIterator[FormData]:
+    """Yield the form of a request for a job, with so many files at most; a few too many get the answer that names them.
 
-    Its files are on the disk; `context.uploads.content` reads one. Raises a problem before it reads what is no form.
+    Its files are on the disk; `context.uploads.content` reads one. Raises a problem before it reads what is no form, or
+    what there is no room for, on the disk and in the queue.
     """
+    await run_in_threadpool(require_disk_space, context)
+    await run_in_threadpool(require_queue_room, context, venue_id, kind, sender)
     if not is_form(request):
         raise Problem("not-multipart", "Send each picture as a file part of a form, as curl -F does.")
     files = most_files + PARTS_TOO_MANY
     with context.uploads.admitted(request), Spool() as spool:
         yield await parsed_form(request, spool, files, PARTS_TOO_MANY, LONGEST_OPTIONS)
-
-
-def most_frames(context: Context, venue: Venue) -> int:
-    """Return the number of frames that the cameras of a venue may have together."""
-    return len(venue.cameras) * context.settings.max_frames_per_camera
 
 
 def parse_options(form: FormData, model: type[Chosen], settings: Settings) -> Chosen:

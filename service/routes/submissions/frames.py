@@ -1,17 +1,16 @@
 """Submission of calibrations and field fits: frames are checked, stored, and queued as a job before the answer."""
 
-from __future__ import annotations
-
 from fastapi import APIRouter, Request, Response
 from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import FormData
 
-from service.api.context import Context, InContext, VenueIdPath
+from service.api.context import Context, InContext
 from service.routes.contract.documented import frames_form_body, needs_scope, submission_responses
 from service.routes.contract.guarded import Guarded
 from service.routes.contract.problem_docs import OF_FRAMES, OF_SOURCES, problem_responses
 from service.routes.submissions import forms, job_submission
 from service.routes.submissions.job_submission import FromSender, Sender
+from service.routes.venues import ExistingVenue
 from service.schemas.job import Job
 from service.schemas.names import JobKind
 from service.schemas.options import FieldOptions, Options
@@ -28,16 +27,16 @@ router = APIRouter(tags=["jobs"], route_class=Guarded)
     openapi_extra=frames_form_body(Options, required=False) | needs_scope("calibrate"),
 )
 async def submit_calibration(
-    venue_id: VenueIdPath, request: Request, context: InContext, sender: FromSender
+    venue: ExistingVenue, request: Request, context: InContext, sender: FromSender
 ) -> Response:
     """Submit a frame (or several) per camera, or none at all. Follow the job at `Location`.
 
     Without frames (no body, or a form with `options` alone) the service fetches one from the source of each camera.
     """
     if forms.is_empty(request):
-        stored = await run_in_threadpool(forms.venue_for_upload, context, venue_id)
-        return await run_in_threadpool(fetch, context, stored.id, Options(), sender)
-    return await _uploaded(Options, venue_id, request, context, sender)
+        await run_in_threadpool(forms.require_disk_space, context)
+        return await run_in_threadpool(fetch, context, venue.id, Options(), sender)
+    return await _uploaded(Options, venue, request, context, sender)
 
 
 @router.post(
@@ -47,23 +46,22 @@ async def submit_calibration(
     responses=submission_responses() | problem_responses(*OF_FRAMES),
     openapi_extra=frames_form_body(FieldOptions) | needs_scope("calibrate"),
 )
-async def submit_field_fit(venue_id: VenueIdPath, request: Request, context: InContext, sender: FromSender) -> Response:
+async def submit_field_fit(venue: ExistingVenue, request: Request, context: InContext, sender: FromSender) -> Response:
     """Fit length, width and ridge of the pitch to the frames of all cameras. The stored venue stays as it is.
 
     The result has each measure with its sigma, says which the frames cannot tell and why, and has a `field` to be put
     into the venue.
     """
-    return await _uploaded(FieldOptions, venue_id, request, context, sender)
+    return await _uploaded(FieldOptions, venue, request, context, sender)
 
 
 async def _uploaded(
-    model: type[Options | FieldOptions], venue_id: str, request: Request, context: Context, sender: Sender
+    model: type[Options | FieldOptions], venue: Venue, request: Request, context: Context, sender: Sender
 ) -> Response:
-    stored = await run_in_threadpool(forms.venue_for_upload, context, venue_id)
     kind: JobKind = "calibration" if model is Options else "field"
-    await run_in_threadpool(job_submission.require_queue_room, context, stored.id, kind, sender)
-    async with forms.parsed_upload(request, context, forms.most_frames(context, stored)) as form:
-        return await run_in_threadpool(submit, context, stored, form, model, sender)
+    most = len(venue.cameras) * context.settings.max_frames_per_camera
+    async with forms.parsed_upload(request, context, venue.id, kind, sender, most) as form:
+        return await run_in_threadpool(submit, context, venue, form, model, sender)
 
 
 def submit(

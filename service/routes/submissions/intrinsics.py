@@ -1,7 +1,5 @@
 """Submission of lens calibrations: photos of a board become a job that finds the lens."""
 
-from __future__ import annotations
-
 from pathlib import PurePath
 
 from fastapi import APIRouter, Request, Response
@@ -44,9 +42,8 @@ async def submit_lens_calibration(
     sender: FromSender,
 ) -> Response:
     """Submit photos of a board, from which a job finds the lens. Its picture `coverage.jpg` shows what it rests on."""
-    await run_in_threadpool(forms.require_disk_space, context)
-    await run_in_threadpool(job_submission.require_queue_room, context, None, "intrinsics", sender)
-    async with forms.parsed_upload(request, context, context.settings.max_photos) as form:
+    most = context.settings.max_photos
+    async with forms.parsed_upload(request, context, None, "intrinsics", sender, most) as form:
         return await run_in_threadpool(_submit, context, form, sender)
 
 

@@ -1,7 +1,5 @@
 """Submission of jobs: the files of a form are checked, stored, and become a job."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -1,20 +1,19 @@
 """Submission of first poses: clicked points become a job that finds the pose of a camera."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
 from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import FormData, UploadFile
 
-from service.api.context import CameraIdPath, Context, InContext, VenueIdPath
+from service.api.context import CameraIdPath, Context, InContext
 from service.routes.contract.documented import form_body, needs_scope, submission_responses
 from service.routes.contract.guarded import Guarded
 from service.routes.contract.problem_docs import OF_FRAMES, problem_responses
 from service.routes.jobs import job_response, wait_for_end
 from service.routes.submissions import forms, job_submission
 from service.routes.submissions.job_submission import FromSender, Sender
+from service.routes.venues import ExistingVenue
 from service.schemas.job import Job
 from service.schemas.names import OPTIONS_PART
 from service.schemas.options import LocateOptions
@@ -41,7 +40,7 @@ UPLOAD = form_body(
     openapi_extra=UPLOAD | needs_scope("calibrate"),
 )
 async def submit_first_pose(
-    venue_id: VenueIdPath,
+    venue: ExistingVenue,
     camera: CameraIdPath,
     request: Request,
     context: InContext,
@@ -54,10 +53,8 @@ async def submit_first_pose(
 
     The job takes about a second and waits for no calibration; with `wait` the answer is its end.
     """
-    stored = await run_in_threadpool(forms.venue_for_upload, context, venue_id)
-    await run_in_threadpool(job_submission.require_queue_room, context, stored.id, "locate", sender)
-    async with forms.parsed_upload(request, context, 1) as form:
-        job, new = await run_in_threadpool(_submit, context, stored, camera, form, sender)
+    async with forms.parsed_upload(request, context, venue.id, "locate", sender, 1) as form:
+        job, new = await run_in_threadpool(_submit, context, venue, camera, form, sender)
     job = await wait_for_end(context, job, wait)
     return job_response(job, status=202 if new and job.open else 200)
 

@@ -1,7 +1,5 @@
 """New jobs from the frames of old ones, beginning with the poses that are stored now."""
 
-from __future__ import annotations
-
 import hashlib
 
 from fastapi import APIRouter, Request, Response
@@ -12,6 +10,7 @@ from service.routes.contract.guarded import Guarded
 from service.routes.contract.problem_docs import problem_responses
 from service.routes.jobs import ExistingJob
 from service.routes.submissions import forms, job_submission
+from service.routes.venues import existing_venue
 from service.schemas.job import Job
 from service.schemas.options import Options
 from service.schemas.problems import Problem
@@ -20,7 +19,6 @@ from service.store.ids import new_id
 from service.store.jobs.files import frame_folder
 from service.store.jobs.submission import Submission
 from service.store.jobs.task import Origin, UnreadableJob, seeded
-from service.store.refusals import no_such_venue
 
 OF_COPIES = (
     "frames-deleted",
@@ -65,9 +63,7 @@ def calibrate_found_cameras(job: ExistingJob, request: Request, context: InConte
         detail = f"It is no search for cameras but of the kind {job.kind}: POST /jobs/{job.id}/again takes its frames."
         raise Problem("poses-not-found", detail, job=job.id)
     forms.require_disk_space(context)
-    venue = context.venues.get(job.venue or "")
-    if venue is None:
-        raise no_such_venue(job.venue or "")
+    venue = existing_venue(job.venue or "", context)
     search = _kept(context, job)
     missing = [camera for camera in venue.poses if camera not in search.frames]
     if missing:
@@ -131,9 +127,7 @@ def _submit_copy(context: Context, job: Job, wanted: Submission, origin: Origin)
 
 def _require_the_same(context: Context, then: Venue) -> None:
     """Raise the problem `venue-replaced` if the pitch, the cameras or their lenses were changed since."""
-    now = context.venues.get(then.id)
-    if now is None:
-        raise no_such_venue(then.id)
+    now = existing_venue(then.id, context)
     if not now.accepts_frames_of(then):
         raise Problem("venue-replaced", "Its pitch, cameras or lenses were changed since; send new frames.")
 

@@ -1,7 +1,5 @@
 """Checks of callback URLs, so that the service calls no host that its operator does not allow (SSRF)."""
 
-from __future__ import annotations
-
 import ipaddress
 from typing import Any
 

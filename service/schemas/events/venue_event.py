@@ -1,7 +1,5 @@
 """Events of a venue, as webhooks and event streams deliver them."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from datetime import datetime
 from typing import Annotated, Literal, get_args

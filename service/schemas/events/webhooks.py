@@ -1,7 +1,5 @@
 """Webhooks of a venue. Apart from the events: a venue has webhooks, and events have venues."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any
 
 from pydantic import ConfigDict, Field

@@ -1,7 +1,5 @@
 """Request and answer of the program that finds a first pose while somebody clicks points."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from pydantic import Field

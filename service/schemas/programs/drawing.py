@@ -1,15 +1,15 @@
-"""Request and answer of the program that draws pictures: a line of JSON, followed by files."""
+"""Request of the program that draws pictures."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from pydantic import BaseModel
 
 from service.schemas.field import FieldOfPlay
 from service.schemas.geometry import Light, PosedCamera
-from service.schemas.programs.files import split_files
+from service.schemas.programs.files import ProgramMessage
 
 # For types only: the models of venues and results take as long to load as NumPy, and somebody waits for the program.
 if TYPE_CHECKING:
@@ -38,11 +38,11 @@ class MarkingToDraw(BaseModel):
     side: str | None
 
 
-class DrawingRequest(BaseModel):
+class DrawingRequest(ProgramMessage):
     """Request for pictures of a calibration: field and cameras before the job (`stored`) and as it `found` them.
 
-    `markings`, `lights` and `ignore` (polygons) are by camera. `names`: names of the pictures; `sizes`: bytes of the
-    frames that follow, one for each camera that is needed.
+    `markings`, `lights` and `ignore` (polygons) are by camera. `names`: names of the pictures. A frame follows of each
+    camera that is needed.
     """
 
     stored: FieldAndCameras
@@ -52,12 +52,9 @@ class DrawingRequest(BaseModel):
     ignore: dict[str, list[list[list[float]]]]
     names: list[str]
     threads: int
-    sizes: dict[str, int]
 
     @classmethod
-    def of(
-        cls, venue: Venue, result: Result, names: Sequence[str], threads: int, files: Mapping[str, bytes]
-    ) -> DrawingRequest:
+    def of(cls, venue: Venue, result: Result, names: Sequence[str], threads: int) -> DrawingRequest:
         """Return the request for pictures of a job, from the venue that it began with and its result."""
         stored = FieldAndCameras(field=venue.field, cameras=[camera.posed for camera in venue.cameras])
         cameras = [
@@ -65,7 +62,6 @@ class DrawingRequest(BaseModel):
             for camera, new in zip(stored.cameras, result.cameras, strict=True)
         ]
         found = FieldAndCameras(field=_field_found(venue, result), cameras=cameras)
-        sizes = {camera: len(file) for camera, file in files.items()}
         return cls(
             stored=stored,
             found=found,
@@ -74,7 +70,6 @@ class DrawingRequest(BaseModel):
             ignore={camera.id: camera.ignore for camera in venue.cameras},
             names=list(names),
             threads=threads,
-            sizes=sizes,
         )
 
 
@@ -95,19 +90,3 @@ def _field_found(venue: Venue, result: Result) -> FieldOfPlay:
     if options.get("flat") or options.get("preset") in FLAT:
         return venue.field.model_copy(update={"ridge": None})
     return venue.field.model_copy(update={"ridge": result.ridge or venue.field.ridge})
-
-
-class DrawnPictures(BaseModel):
-    """Answer: sizes in bytes of the pictures that follow, by name; those that cannot be drawn are missing."""
-
-    sizes: dict[str, int]
-
-
-def encode_message(message: DrawingRequest | DrawnPictures, files: Mapping[str, bytes]) -> bytes:
-    """Return a message as a line of JSON, followed by its files."""
-    return b"".join((message.model_dump_json().encode(), b"\n", *files.values()))
-
-
-def decode_files(sizes: dict[str, int], data: bytes) -> dict[str, bytes]:
-    """Return the files after the line of JSON by their names."""
-    return split_files(data[data.index(b"\n") + 1 :], sizes)

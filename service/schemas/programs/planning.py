@@ -1,7 +1,5 @@
 """Request of the program that plans cameras before they are mounted."""
 
-from __future__ import annotations
-
 from service.schemas.base import Schema
 from service.schemas.plan import HiddenShare, LineStateName, PlannedSite
 

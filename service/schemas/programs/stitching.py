@@ -1,22 +1,19 @@
-"""Request of the program that makes stitched views: a line of JSON, followed by frames."""
-
-from __future__ import annotations
+"""Request of the program that makes stitched views."""
 
 from typing import Literal
-
-from pydantic import BaseModel
 
 from service.schemas.field import FieldOfPlay
 from service.schemas.geometry import Light, PosedCamera
 from service.schemas.names import StitchFormat
+from service.schemas.programs.files import ProgramMessage
 from service.schemas.view import ViewChoice
 
 
-class StitchRequest(BaseModel):
+class StitchRequest(ProgramMessage):
     """Request for a package of maps, or for a stitched picture of frames (`wanted`).
 
     `lights`: photometric corrections by camera; `revision`: of the poses; `tag`: the package's; `seam`: draw the seams
-    into the picture; `sizes`: bytes of the frames that follow, in the cameras' order.
+    into the picture. Frames follow where a picture is wanted.
     """
 
     venue: str
@@ -29,4 +26,3 @@ class StitchRequest(BaseModel):
     tag: str
     seam: bool = False
     threads: int
-    sizes: dict[str, int] = {}

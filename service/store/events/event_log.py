@@ -4,8 +4,6 @@ The numbers of a venue's events are in the order of their transactions, so that 
 whoever writes about a venue is serialised about it from the beginning (`lock_venue`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
@@ -40,7 +38,7 @@ class NewEvent:
     job: str | None = None
     urls: Sequence[str] = ()
 
-    def to(self, webhooks: Sequence[Webhook]) -> NewEvent:
+    def to(self, webhooks: Sequence[Webhook]) -> "NewEvent":
         """Return the event with the URLs of those webhooks of its venue that get such events."""
         return replace(self, urls=[hook.url for hook in webhooks if matches_kinds(self.what, hook.events)])
 

@@ -1,7 +1,5 @@
 """Reading the event log: the events of a venue since a number."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

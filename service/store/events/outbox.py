@@ -4,8 +4,6 @@ A delivery is written in the transaction that makes true what it tells. To attem
 dies over an attempt leaves it to be attempted again, so it is made at least once, by one worker at a time.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass

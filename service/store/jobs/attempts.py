@@ -4,8 +4,6 @@ Every write of a worker carries the fencing token of its attempt (`run_token`) a
 cancelled or given to another attempt meanwhile.
 """
 
-from __future__ import annotations
-
 import uuid
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
@@ -23,9 +21,9 @@ from service.store.jobs.ending import End, RowConditions, changed, end_job, stil
 from service.store.jobs.queries import ONE, job_input_values
 from service.store.jobs.task import Task, UnreadableJob, parse_job_input
 from service.store.memories import Memories, newest_memories
-from service.store.silence import unheard_for
 from service.store.statistics.venue_quality import last_accepted_views
 from service.store.trends import anchors_of
+from service.store.workers import unheard_for
 
 NO_MEMORIES: Memories = MappingProxyType({})
 # Job, priority and kind, into the queue in the caller's transaction.

@@ -1,7 +1,5 @@
 """Decisions of people about jobs: cancel one, accept its poses after all, or reject them."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from dataclasses import dataclass
 

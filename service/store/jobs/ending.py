@@ -1,7 +1,5 @@
 """The end of a job: load what it depends on, fold the end into it, write what changes, in one transaction."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace

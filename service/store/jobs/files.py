@@ -1,7 +1,5 @@
 """Paths of the files of jobs in the blob store."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 # Pictures to be laid over others.

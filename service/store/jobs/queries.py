@@ -1,7 +1,5 @@
 """Jobs as clients see them, and their states for long polls and streams."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import count

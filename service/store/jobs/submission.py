@@ -1,7 +1,5 @@
 """Submission: frames and options of a client become a job, or are found to be one already."""
 
-from __future__ import annotations
-
 import hashlib
 from datetime import datetime, timedelta
 from typing import Any
@@ -23,9 +21,9 @@ from service.store.jobs.ending import End, end_job
 from service.store.jobs.files import frame_folder
 from service.store.jobs.queries import ONE, job_input_values, read_job
 from service.store.jobs.task import JobInput, parse_job_input
-from service.store.refusals import RETRY_AFTER_S, no_such_venue, venue_busy, venue_is_stored
+from service.store.refusals import RETRY_AFTER_S, venue_busy, venue_is_stored
 from service.store.schedules import reserved_places
-from service.store.venues import find_venue
+from service.store.venues import existing_venue, find_venue
 
 PRIORITIES = {"live": 1, "routine": 100}
 # Prefix of the content hash of a job whose frames were fetched.
@@ -210,9 +208,7 @@ def _waiting(connection: sa.Connection) -> int:
 
 def _as_it_is_now(connection: sa.Connection, read: Venue) -> Venue:
     """Return the stored venue; raises a problem if it is gone, or frames of the one that was `read` do not fit it."""
-    venue = find_venue(connection, read.id)
-    if venue is None:
-        raise no_such_venue(read.id)
+    venue = existing_venue(connection, read.id)
     if not venue.accepts_frames_of(read):
         raise Problem(
             "venue-replaced",

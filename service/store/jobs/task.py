@@ -1,7 +1,5 @@
 """Input of a job. It travels as JSON to the program that computes it, which sees no database."""
 
-from __future__ import annotations
-
 import secrets
 from dataclasses import dataclass, replace
 from datetime import datetime
@@ -149,7 +147,7 @@ class Task(JobInput):
     # By camera: the pose that its movement is counted from, of those that have one.
     anchors: dict[str, Anchor] = {}
 
-    def without_addresses(self) -> Task:
+    def without_addresses(self) -> "Task":
         """Return the task without who is told of it and where its client is: to compute it nobody need know."""
         untold = self.venue and self.venue.model_copy(update={"webhooks": [], "alarms": None})
         options = self.options.model_copy(update={"callback_url": None})

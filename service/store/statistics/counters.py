@@ -5,8 +5,6 @@ counted is counted in the transaction that makes it true, and is true to the las
 that there are some two hundred rows and never more.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache

@@ -1,7 +1,5 @@
 """Outcomes of jobs, and their increments of the counters."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from datetime import datetime
 from typing import get_args

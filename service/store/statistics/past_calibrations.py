@@ -1,7 +1,5 @@
 """Ended calibrations of a venue, for pages and charts of hundreds of jobs."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from dataclasses import dataclass
 from datetime import datetime

@@ -1,7 +1,5 @@
 """The statistics that /metrics shows, read in one transaction from rows that are few or indexed."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime

@@ -1,12 +1,10 @@
 """Histogram of the times that sources of cameras take to give a frame."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import structlog
 
-from service.schemas.programs.fetching import SourceFetch
+from service.schemas.programs.sources import SourceFetch
 from service.store.database import DATABASE_OUTAGES, Repository, writing
 from service.store.statistics import counters
 from service.store.statistics.counters import HistogramBuckets

@@ -1,7 +1,5 @@
 """Quality of a venue from its results: the row of each venue in `venue_quality`."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import datetime

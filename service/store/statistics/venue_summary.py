@@ -1,7 +1,5 @@
 """Summaries of venues for the list of all venues: their last calibrations and active alarms."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 
 import sqlalchemy as sa

@@ -60,7 +60,7 @@ def refused_members(context, read, form):
 
 def test_a_job_begins_from_the_poses_that_were_found_during_the_upload(context, read, form):
     moved = Pose.from_position(read.cameras[0].pose.rotation, [0.0, -60.0, 9.0])
-    context.venues.put(read.with_poses({"left": moved}))
+    context.venues.put(read.with_cameras({"left": {"pose": moved}}))
     assert frames.submit(context, read, form, Options, Sender(None, Origin())).status_code == 202
     (job,) = context.jobs.page(JobPage(10, venue="v")).jobs
     assert context.attempts.begin(job.id).venue == context.venues.get("v")

@@ -9,7 +9,7 @@ import sqlalchemy as sa
 from service.observability.disk import Disk
 from service.observability.metrics import Metrics
 from service.schemas.job import JobError
-from service.schemas.programs.fetching import SourceFetch
+from service.schemas.programs.sources import SourceFetch
 from service.schemas.results import View
 from service.schemas.schedule import Schedule
 from service.store import tables

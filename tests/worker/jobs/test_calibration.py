@@ -13,7 +13,8 @@ from service.schemas import geometry
 from service.schemas.field import OtherField
 from service.schemas.lens_limits import LARGEST_SIGMA, LEAST_SIGMA
 from service.schemas.options import Options
-from service.schemas.programs.drawing import FLAT, DrawingRequest, DrawnPictures, decode_files, encode_message
+from service.schemas.programs.drawing import FLAT, DrawingRequest
+from service.schemas.programs.files import ProgramMessage
 from service.schemas.results import AdoptableNumber
 from service.schemas.venue import VenueIn
 from service.settings import MODEL_BESIDE_THE_CODE
@@ -249,9 +250,9 @@ def test_pictures_of_poses_that_are_accepted_wait_for_who_looks_but_for_what_the
 
 
 def drawn_by_a_process(given, frames):
-    program, message = [sys.executable, "-m", "worker.programs.draw"], encode_message(given, frames)
-    run = subprocess.run(program, input=message, stdout=subprocess.PIPE, check=True)
-    return decode_files(DrawnPictures.model_validate_json(run.stdout.splitlines()[0]).sizes, run.stdout)
+    program = [sys.executable, "-m", "worker.programs.draw"]
+    run = subprocess.run(program, input=given.encode(frames), stdout=subprocess.PIPE, check=True)
+    return ProgramMessage.decode(run.stdout)[1]
 
 
 def drawn_here(given, frames):
@@ -277,7 +278,7 @@ def test_a_picture_drawn_later_is_the_one_that_the_job_draws(venue, files, asked
     drawn_later = drawn_by_a_process if options == Options() else drawn_here
     for name in ("preview", "birdseye", "frame_left", "frame_right"):
         needed = {camera: file for camera, file in first.items() if not name.startswith("frame") or camera in name}
-        given = DrawingRequest.of(venue, outcome.result, drawn_together(name), 1, needed)
+        given = DrawingRequest.of(venue, outcome.result, drawn_together(name), 1)
         drawn = drawn_later(given, needed)
         assert set(drawn) == set(drawn_together(name))
         assert all(picture == outcome.pictures[each] for each, picture in drawn.items())

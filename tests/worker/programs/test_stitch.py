@@ -62,7 +62,7 @@ def demo_pair():
     """Cameras as they stand, their field and their files."""
     venue = VenueIn.model_validate_json((DEMO / "venue.json").read_text()).to_venue()
     truth = json.loads((DEMO / "truth.json").read_text())["poses"]
-    venue = venue.with_poses({name: Pose.from_position(**pose) for name, pose in truth.items()})
+    venue = venue.with_cameras({name: {"pose": Pose.from_position(**pose)} for name, pose in truth.items()})
     return venue.poses_and_lenses, venue.field, {one.id: DEMO / f"{one.id}.jpg" for one in venue.cameras}
 
 

@@ -5,8 +5,6 @@ are not found there, in this order, the first that the gate accepts: the poses i
 another resolution, the camera turned where it stands, zoomed where it stands, anywhere, or with another lens.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal

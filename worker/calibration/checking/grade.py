@@ -1,7 +1,5 @@
 """Grade of a checked camera: good, drifted, wrong or cannot tell; how far off it is, and the causes in words."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal
 

@@ -4,8 +4,6 @@ Cheap evidence first: a reading by which no camera films the field is none; the 
 with the lines at a coarse tolerance, the best of these after climbing from there, as proposals of a search are.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

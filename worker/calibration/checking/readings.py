@@ -5,8 +5,6 @@ convention is tried: rotations and places the other way round, other units, othe
 file are written in one convention.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

@@ -6,8 +6,6 @@ violet side of white lines), and the intrinsics are those of green. But blue pai
 be as bright in green as their ground.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from enum import IntEnum
 from typing import Protocol

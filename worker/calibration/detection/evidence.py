@@ -5,8 +5,6 @@ that goes on along the line. The second needs no training and sees lines on any 
 off the same picture: the same pieces, looked for beside themselves.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -59,7 +57,7 @@ class Evidence:
         """Share found beyond chance: 1 where all lines are found, 0 where no more than anywhere (Cohen, 1960)."""
         return (self.share - self.by_chance) / max(1.0 - self.by_chance, LEAST_ROOM)
 
-    def for_marking(self, marking: int) -> Evidence:
+    def for_marking(self, marking: int) -> "Evidence":
         """Return the evidence for one marking."""
         return take_rows(self, self.marking == marking)
 

@@ -1,7 +1,5 @@
 """Exclusions from a frame: ignored areas, and painted lines that are not the venue's."""
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 from numpy.typing import NDArray

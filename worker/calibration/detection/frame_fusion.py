@@ -5,8 +5,6 @@ that, so each frame is read where the camera had turned to when it was taken. A 
 it moves it: three numbers a frame, found from what stands still around the pitch.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -33,7 +31,7 @@ class Sway:
     shift: NDArray[np.float32] | None
 
     @classmethod
-    def from_turn(cls, turn: Array, lens: Lens) -> Sway:
+    def from_turn(cls, turn: Array, lens: Lens) -> "Sway":
         """Return the displacement for a camera that turned by a rotation vector (3,) in its own frame, rad."""
         width, height = lens.size
         grid = np.stack(

@@ -4,8 +4,6 @@ The profile is the one that a line of the expected width should have after the b
 in the channel in which the marking stands out.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -55,11 +53,11 @@ class Matches:
     base: Array
     sampling_px: float
 
-    def with_polarity(self, sign: int) -> Matches:
+    def with_polarity(self, sign: int) -> "Matches":
         """Return the matches for lines brighter (1) or darker (-1) than their ground; ignores other paint."""
         return self if sign == 1 else replace(self, correlation=-self.correlation, along=-self.along)
 
-    def where(self, chosen: NDArray[np.bool_], sign: int) -> Matches:
+    def where(self, chosen: NDArray[np.bool_], sign: int) -> "Matches":
         """Return the matches of some pieces, for lines that are brighter (1) or darker (-1) than their ground."""
         return replace(
             self,

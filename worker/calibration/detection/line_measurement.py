@@ -4,8 +4,6 @@ That a ridge is a marking is said by one of two witnesses: the segmentation, or 
 the line as noise and things beside the line do not.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Self
@@ -101,7 +99,7 @@ class Measurements:
         """Number (M,) of neighbours that share the same misfit, 1 at least."""
         return np.maximum(10.0 / self.length_px, 1.0)
 
-    def __getitem__(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> Measurements:
+    def __getitem__(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> "Measurements":
         return take_rows(self, chosen)
 
 
@@ -177,7 +175,7 @@ class LineProfiles:
         moved = camera.project(lines.position[self._seen.index]) - self._seen.pixel
         return np.asarray(np.sum(moved * self._seen.normal, axis=1))
 
-    def _found(self, centred: _Centred, expected: Array, search_px: float) -> tuple[NDArray[np.intp], Array, Array]:
+    def _found(self, centred: "_Centred", expected: Array, search_px: float) -> tuple[NDArray[np.intp], Array, Array]:
         """Return which lines of one class were found, how far (px) from where they were read, and their trust 0..1."""
         matches = centred.matches
         shifts = matches.base[:, None] + matches.shifts

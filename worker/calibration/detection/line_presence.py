@@ -7,8 +7,6 @@ thousand columns. The lines of one camera move together when it turns, so the on
 found first; only near it is each of them looked for.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Brightness profile across a painted line, after a blur."""
 
-from __future__ import annotations
-
 from math import erf, pi, sqrt
 
 import numpy as np

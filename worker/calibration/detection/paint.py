@@ -5,8 +5,6 @@ pixel / G - 1 = a (P / G - 1) =: a D: the share `a` of a paint is linear in what
 in shade, and for cameras of different exposure. So a frame can be drawn as one in which one paint alone is bright.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import cv2

@@ -4,8 +4,6 @@ The network knows lines better than this on the fields that it has learnt. On ot
 sees what it does not, so that a search that came to nothing with the one may find the pose with the other.
 """
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 from numpy.typing import NDArray

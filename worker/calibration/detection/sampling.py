@@ -1,7 +1,5 @@
 """Reading pictures between pixels."""
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 from numpy.typing import NDArray

@@ -7,8 +7,6 @@ It sees frames of more than about 2.5K shrunk to half: a quarter of the work, an
 the same poses to 0.01 px on clicked points. The refinement reads the frame itself.
 """
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -50,7 +48,7 @@ class Region:
     right: int
     bottom: int
 
-    def shrunk(self, factor: int) -> Region:
+    def shrunk(self, factor: int) -> "Region":
         """Return the rectangle in the frame shrunk by `factor`."""
         return Region(self.left // factor, self.top // factor, self.right // factor, self.bottom // factor)
 
@@ -67,7 +65,7 @@ class Segmenter:
         self.sha256 = hashlib.sha256(model.read_bytes()).hexdigest()
 
     @cached_property
-    def session(self) -> ort.InferenceSession:
+    def session(self) -> "ort.InferenceSession":
         """ONNX Runtime session of the network."""
         import onnxruntime as ort
 
@@ -89,7 +87,7 @@ class Segmenter:
         return name
 
     @cached_property
-    def _run_options(self) -> ort.RunOptions:
+    def _run_options(self) -> "ort.RunOptions":
         import onnxruntime as ort
 
         options = ort.RunOptions()

@@ -1,7 +1,5 @@
 """Blur of a lens, measured at edges in the frame itself."""
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 from numpy.typing import NDArray

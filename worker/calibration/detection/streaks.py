@@ -1,7 +1,5 @@
 """Thin bright or dark streaks in a picture, by direction and width: all that a line is before anything is learnt."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import cv2
@@ -29,7 +27,7 @@ class Streaks:
     strength: tuple[NDArray[np.uint8], ...]
 
     @classmethod
-    def of(cls, picture: Frame) -> Streaks:
+    def of(cls, picture: Frame) -> "Streaks":
         """Return the streaks of a picture (H, W, 3), in all directions and widths."""
         levels = [_streaks(picture)]
         for level in range(1, LEVELS):
@@ -37,7 +35,7 @@ class Streaks:
             levels.append(_streaks(np.asarray(smaller, dtype=np.uint8)))
         return cls(tuple(levels))
 
-    def widened(self, by_px: int) -> Streaks:
+    def widened(self, by_px: int) -> "Streaks":
         """Return the streaks dilated: every pixel has the strongest one within half of `by_px`."""
         return Streaks(
             tuple(

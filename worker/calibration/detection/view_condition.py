@@ -8,8 +8,6 @@ usable: what the search cannot do with it, the gate says better. So does a store
 what lies where it puts the lines is no field, whatever the weather.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal
 
@@ -134,11 +132,11 @@ def least_light(noise: float, least: float = LEAST_LIGHT) -> float:
 
 
 def _cause(
-    cells: _Cells,
+    cells: "_Cells",
     field: Mask,
     lost: Mask,
     spoiled: dict[str, Mask],
-    sharpness: _Sharpness,
+    sharpness: "_Sharpness",
     figures: ViewFigures,
     usual: UsualView | None,
 ) -> tuple[Spoiled | None, Mask]:
@@ -164,10 +162,10 @@ def _cause(
 
 
 def _is_blocked(
-    cells: _Cells,
+    cells: "_Cells",
     field: Mask,
     lost: Mask,
-    sharpness: _Sharpness,
+    sharpness: "_Sharpness",
     smeared: bool,
     figures: ViewFigures,
     usual: UsualView | None,
@@ -194,7 +192,7 @@ def _is_blocked(
     return gone and not smeared
 
 
-def _differ(cells: _Cells, one: Mask, other: Mask) -> bool:
+def _differ(cells: "_Cells", one: Mask, other: Mask) -> bool:
     a, b = (np.median(cells.colour[part], axis=0) for part in (one, other))
     tint = float(np.abs(a / max(a.sum(), 1.0) - b / max(b.sum(), 1.0)).max())
     light = abs(np.log(max(a.sum(), 1.0) / max(b.sum(), 1.0)))
@@ -203,7 +201,7 @@ def _differ(cells: _Cells, one: Mask, other: Mask) -> bool:
     return bool(tint > 0.06 or light > np.log(3.5) or structure > np.log(2.5))
 
 
-def _spoiled(cells: _Cells, field: Mask, lost: Mask, noise: float) -> dict[str, Mask]:
+def _spoiled(cells: "_Cells", field: Mask, lost: Mask, noise: float) -> dict[str, Mask]:
     """Return the cells of the field that show each defect and have no lines, by the names of `ViewFigures`."""
     dim = cells.brightest < min(least_light(noise), DIM)
     blown = cells.blown > 0.5
@@ -224,7 +222,7 @@ def _without_lines(kind: Mask, lost: Mask) -> Mask:
 
 
 def _figures(
-    cells: _Cells,
+    cells: "_Cells",
     field: Mask,
     sight: LinesInSight,
     lost: Mask,
@@ -252,7 +250,7 @@ def _expected_lines(pitch: Field, camera: Camera) -> VisibleLines:
     return lines[wide] if wide.sum() >= 3 * FEWEST_PLACES else lines
 
 
-def _lost(sight: LinesInSight, ground: _Ground) -> Mask:
+def _lost(sight: LinesInSight, ground: "_Ground") -> Mask:
     """Return the cells (h, w) in whose surroundings hardly any expected line is found.
 
     Far from all lines a cell takes the share of its farther surroundings.
@@ -333,7 +331,7 @@ class _Ground:
     cell_px: float
 
     @classmethod
-    def of(cls, pitch: Field, camera: Camera) -> _Ground:
+    def of(cls, pitch: Field, camera: Camera) -> "_Ground":
         """Return the ground in a reduced picture, without the field's rim where enough is left: the pose may be off."""
         width, height = camera.intrinsics.size
         cell = width / CELLS
@@ -392,7 +390,7 @@ class _Sharpness:
     size: float
 
     @classmethod
-    def of(cls, frame: Frame, grey: NDArray[np.uint8], field: Mask, lost: Mask) -> _Sharpness:
+    def of(cls, frame: Frame, grey: NDArray[np.uint8], field: Mask, lost: Mask) -> "_Sharpness":
         """Measure the blur of a frame and its reduced grey picture, with the cells of the field and the lost ones."""
         clear = field & ~lost
         of_all = edge_blur_px(frame, grey, _enlarged(field, grey.shape))
@@ -429,7 +427,7 @@ class _Cells:
     colour: Array
 
     @classmethod
-    def of(cls, small: Frame, size: tuple[int, int]) -> _Cells:
+    def of(cls, small: Frame, size: tuple[int, int]) -> "_Cells":
         """Return the cells of a reduced frame (H, W, 3), for `size` (columns, rows)."""
 
         def mean(plane: NDArray[np.generic]) -> Array:

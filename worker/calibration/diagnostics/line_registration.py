@@ -6,8 +6,6 @@ does without the network. Each point is the same piece of line in both views: wh
 own cannot be registered, which is for the responses to do.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

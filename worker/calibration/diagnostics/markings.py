@@ -6,8 +6,6 @@ swell, and what the lens may have wrong; what moves all of a line by more is its
 its crown.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -127,7 +125,6 @@ def _farther_away(
 
 
 def _together(lines: LinePoints, one: Measurements, other: Measurements) -> Measurements:
-    """Return the measurements of both."""
     both = {name: np.concatenate([getattr(one, name), getattr(other, name)]) for name in MEASURED}
     return Measurements(points=lines[both["index"]], misfit_px=one.misfit_px, **both)
 
@@ -158,7 +155,7 @@ def _offsets(
     return {number: (offset, worse * sigma) for number, (offset, sigma) in offsets.items()}
 
 
-def _joint_offsets(means: _Means, free: Sequence[int]) -> dict[int, tuple[float, float]]:
+def _joint_offsets(means: "_Means", free: Sequence[int]) -> dict[int, tuple[float, float]]:
     """Return offset and sigma of each group if it and the `free` ones may be elsewhere, and all others are in place."""
     offsets = {}
     for row, number in enumerate(means.group):
@@ -229,7 +226,7 @@ class _Offsets:
     @classmethod
     def of(
         cls, lines: LinePoints, group: NDArray[np.intp], found: RefinedPose, measured: Measurements
-    ) -> _Offsets | None:
+    ) -> "_Offsets | None":
         """Return the offsets of measurements, None where too few can be used."""
         camera = found.camera
         here = lines.position[measured.index]

@@ -1,7 +1,5 @@
 """Overlap of the segmentation with the expected markings: the share of them it finds, and what it finds beside them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import cv2

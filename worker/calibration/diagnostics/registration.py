@@ -8,8 +8,6 @@ the fanning out that a tilted camera makes; with the form that a turn or a move 
 Unit: 1 px = 10 cm on the pitch.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations

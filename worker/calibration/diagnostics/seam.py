@@ -4,8 +4,6 @@ It is measured across lines, where both cameras have measured the same piece of 
 place says in which direction it holds.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

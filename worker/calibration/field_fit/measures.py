@@ -4,8 +4,6 @@ Poses, measures and the swells of the ground are found together, as in every cal
 leave open is said as a sigma, and a measure that they leave about as open as it was is not touched.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, cast

@@ -3,8 +3,6 @@
 A length is believed by how well the lines fit with it once poses, measures and the swells of the ground are found anew.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 

@@ -6,8 +6,6 @@ found? The log odds of the pose are a weighted sum of the log odds of both answe
 witnesses: what misleads one of them (a floor of several sports, a shadow, a fence) misleads its neighbours.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 BIAS, OF_AGREEMENT, OF_EXPLAINED = -0.9, 2.3, 3.3

@@ -5,8 +5,6 @@ camera 60 m from the far touchline turns by 0.01 degrees to the side, it puts th
 m high and tilts by the same angle, eight centimetres.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Pairs of cameras: whether two of them put the same markings in the same place, and which one is wrong."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 

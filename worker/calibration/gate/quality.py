@@ -1,7 +1,5 @@
 """Quality gate: judges a result without ground truth, and refuses bad ones."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
@@ -93,7 +91,7 @@ class Moved:
     pixels: float
 
     @classmethod
-    def between(cls, pitch: Field, before: Camera, after: Camera) -> Moved:
+    def between(cls, pitch: Field, before: Camera, after: Camera) -> "Moved":
         """Return the change of a camera's pose."""
         lines = pitch.line_points().position
         was = before.project(lines)

@@ -1,7 +1,5 @@
 """The kinds of arrays that the engine hands around."""
 
-from __future__ import annotations
-
 from dataclasses import fields, is_dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 

@@ -5,8 +5,6 @@ A pose is the rotation vector world to camera and the camera's centre in the wor
 the view and does not swing the camera around the pitch: P = K R [I | -C].
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -34,13 +32,13 @@ class Pose:
     position: Array
 
     @classmethod
-    def from_translation(cls, rotation: ArrayLike, translation: ArrayLike) -> Pose:
+    def from_translation(cls, rotation: ArrayLike, translation: ArrayLike) -> "Pose":
         """Return the pose of OpenCV's rvec and tvec (tvec = -R position)."""
         rvec = np.asarray(rotation, dtype=float)
         return cls(rvec, -rotation_matrices(rvec).T @ np.asarray(translation, dtype=float))
 
     @classmethod
-    def looking_at(cls, position: ArrayLike, target: ArrayLike, roll_deg: float = 0.0) -> Pose:
+    def looking_at(cls, position: ArrayLike, target: ArrayLike, roll_deg: float = 0.0) -> "Pose":
         """Return the pose at `position` with `target` in the principal point and a level horizon but for `roll_deg`."""
         centre = np.asarray(position, dtype=float)
         forward = np.asarray(target, dtype=float) - centre
@@ -82,19 +80,19 @@ class Camera:
         plane = self.intrinsics.undistort(pixels)
         return np.concatenate([plane, np.ones_like(plane[..., :1])], axis=-1) @ self.pose.matrix
 
-    def distance_m(self, other: Camera) -> float:
+    def distance_m(self, other: "Camera") -> float:
         """Return the distance (m) between the positions of two cameras."""
         return float(np.linalg.norm(self.pose.position - other.pose.position))
 
-    def with_pose(self, pose: Pose) -> Camera:
+    def with_pose(self, pose: Pose) -> "Camera":
         """Return the camera with another pose."""
         return Camera(self.id, self.intrinsics, pose, self.ignored)
 
-    def with_lens(self, intrinsics: Lens) -> Camera:
+    def with_lens(self, intrinsics: Lens) -> "Camera":
         """Return the camera with another lens."""
         return Camera(self.id, intrinsics, self.pose, self.ignored)
 
-    def resized(self, width_px: int) -> Camera:
+    def resized(self, width_px: int) -> "Camera":
         """Return the camera of its picture resized to a width."""
         lens = self.intrinsics.scaled(width_px / self.intrinsics.size[0])
         return Camera(self.id, lens, self.pose, None if self.ignored is None else self.ignored.resized(lens.size))

@@ -4,8 +4,6 @@ A change (6,) of a pose is a turn (rad, a rotation vector in the camera's own fr
 turn turns the view about the camera, and a shift means the same for all cameras.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from worker.calibration.geometry.camera import NEAREST_DEPTH_M, Array, Camera, Pose

@@ -4,8 +4,6 @@ Two poses with their lenses may agree to a pixel everywhere and still disagree b
 away and seen at a flat angle. A length there says what a focal length in per cent does not.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from worker.calibration.geometry.camera import Array, Camera

@@ -3,8 +3,6 @@
 Everything here describes the *centres* of lines.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -73,7 +71,7 @@ class LinePoints:
     def __len__(self) -> int:
         return len(self.position)
 
-    def __getitem__(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> LinePoints:
+    def __getitem__(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> "LinePoints":
         return take_rows(self, chosen)
 
 
@@ -96,7 +94,7 @@ class Field:
     others: Sequence[Shape] = ()
     sigma: Mapping[str, float] = field(default_factory=dict)
 
-    def resized(self, *, length: float | None = None, width: float | None = None) -> Field:
+    def resized(self, *, length: float | None = None, width: float | None = None) -> "Field":
         """Return the field with another length or width, point by point and with as many dashes."""
         return replace(
             self,
@@ -105,15 +103,15 @@ class Field:
             dashed=self._size if self.dashed is None else self.dashed,
         )
 
-    def dashed_anew(self) -> Field:
+    def dashed_anew(self) -> "Field":
         """Return the field with as many dashes as fit on its lines."""
         return replace(self, dashed=None)
 
-    def flat(self) -> Field:
+    def flat(self) -> "Field":
         """Return the field without a ridge, on a plane."""
         return replace(self, ridge=None)
 
-    def raised(self, by: float) -> Field:
+    def raised(self, by: float) -> "Field":
         """Return the field with its ridge raised by so many metres; a flat one gets a ridge between hips of 45°."""
         if self.ridge is not None:
             return replace(self, ridge=self.ridge + [0.0, 0.0, by])
@@ -132,7 +130,7 @@ class Field:
         assert ridge is not None
         return float(abs(ridge[1, 0] - ridge[0, 0]))
 
-    def with_ridge_length(self, length: float) -> Field:
+    def with_ridge_length(self, length: float) -> "Field":
         """Return the field with a ridge of this length (m) about the same middle, as far as the field has room."""
         raised = self.raised(0.0)
         assert raised.ridge is not None

@@ -6,8 +6,6 @@ Heights are a Gaussian process with a Matérn covariance (Rasmussen and Williams
 of a grid and bilinear between them.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,7 +38,7 @@ class Ground:
     usual_m: float
 
     @classmethod
-    def under(cls, lines: LinePoints) -> Ground:
+    def under(cls, lines: LinePoints) -> "Ground":
         """Return the ground under line points."""
         node_m = 7.0
         at = lines.position[:, :2] / node_m

@@ -1,7 +1,5 @@
 """Resample a camera's picture on a grid in the world, at a matching level of detail."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import cv2

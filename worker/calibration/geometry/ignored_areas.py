@@ -1,7 +1,5 @@
 """Ignored parts of a camera's picture: a railing, a screen, burnt-in graphics."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -26,7 +24,7 @@ class Ignored:
             cv2.fillPoly(area, [np.rint(polygon * 16).astype(np.int32)], 1, shift=4)
         return area > 0
 
-    def resized(self, size: tuple[int, int]) -> Ignored:
+    def resized(self, size: tuple[int, int]) -> "Ignored":
         """Return the same areas of the picture resized to `size` (width, height)."""
         ratio = np.array(size) / self.size
         return Ignored([(polygon + 0.5) * ratio - 0.5 for polygon in self.polygons], size)

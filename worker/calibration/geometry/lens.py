@@ -4,8 +4,6 @@ A lens bends a ray, given by its undistorted image coordinates at depth 1 (x rig
 matrix makes pixels of those (pixel centres at integers). The models differ in how they bend alone.
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -337,7 +335,6 @@ class Fisheye(Lens):
         return angle * (1 + t2 * (k1 + t2 * (k2 + t2 * (k3 + t2 * k4))))
 
     def _angle_derivative(self, angle: Array) -> Array:
-        """Return the derivative of `_distorted_angle`."""
         k1, k2, k3, k4 = self.coefficients.tolist()
         t2 = angle * angle
         return 1 + t2 * (3 * k1 + t2 * (5 * k2 + t2 * (7 * k3 + t2 * 9 * k4)))

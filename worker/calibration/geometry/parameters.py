@@ -1,7 +1,5 @@
 """Parameters that a calibration takes for known and that may be wrong: of each lens, and of the field."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal

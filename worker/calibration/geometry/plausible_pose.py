@@ -1,7 +1,5 @@
 """Plausible poses for filming a field: upright, above it and not far away."""
 
-from __future__ import annotations
-
 import math
 
 from worker.calibration.geometry.camera import Pose

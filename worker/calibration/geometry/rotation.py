@@ -1,7 +1,5 @@
 """Rotations: vectors (axis times angle, rad) and matrices, many at once."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 

@@ -1,7 +1,5 @@
 """Visible points of the markings, and their size in a camera's picture."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -33,7 +31,7 @@ class VisibleLines:
     px_per_metre_up: Array
 
     @classmethod
-    def from_camera(cls, lines: LinePoints, camera: Camera) -> VisibleLines:
+    def from_camera(cls, lines: LinePoints, camera: Camera) -> "VisibleLines":
         """Return the line points that fall into the picture."""
         pixel = camera.project(lines.position)
         index = np.flatnonzero(camera.sees(pixel))
@@ -66,10 +64,10 @@ class VisibleLines:
     def __len__(self) -> int:
         return len(self.points)
 
-    def __getitem__(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> VisibleLines:
+    def __getitem__(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> "VisibleLines":
         return take_rows(self, chosen)
 
-    def thinned(self, spacing_px: float) -> VisibleLines:
+    def thinned(self, spacing_px: float) -> "VisibleLines":
         """Return about one point every `spacing_px` along the lines; each stands for the length of those dropped."""
         walked = np.cumsum(self.length_px)
         kept = np.flatnonzero(np.diff(np.floor(walked / spacing_px), prepend=-1.0) > 0)

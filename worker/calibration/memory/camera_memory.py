@@ -4,8 +4,6 @@ The anchor does not follow: a lens that creeps by a hair a night is compared wit
 not with what it was yesterday. Only accepted jobs are remembered.
 """
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -49,7 +47,7 @@ class AcceptedJob:
         """Arguments of `Epoch.from_job` and `Epoch.joined`."""
         return self.found, self.measured, self.lines, self.at
 
-    def without(self, markings: Sequence[int]) -> AcceptedJob:
+    def without(self, markings: Sequence[int]) -> "AcceptedJob":
         """Return the job without the measurements of some markings."""
         return replace(self, measured=self.measured[~np.isin(self.measured.points.marking, markings)])
 
@@ -73,14 +71,14 @@ class CameraMemory:
     frames: str = ""
 
     @classmethod
-    def from_first_job(cls, stored: Camera, job: AcceptedJob) -> CameraMemory:
+    def from_first_job(cls, stored: Camera, job: AcceptedJob) -> "CameraMemory":
         """Return the memory of the first accepted job, which found a camera that was `stored` before."""
         arguments = job.without(job.repainted_markings).for_epoch
         return cls(
             stored, Epoch.from_job(*arguments), None, (), job.repainted_markings, fingerprint(job.lines), job.frames
         )
 
-    def after(self, job: AcceptedJob) -> CameraMemory:
+    def after(self, job: AcceptedJob) -> "CameraMemory":
         """Return the memory with one more accepted job; the same frames sent again say nothing new."""
         if job.frames == self.frames:
             return self
@@ -123,7 +121,7 @@ class CameraMemory:
         first, last = self.anchor.first, self.anchor.last
         return first if first is None or last is None else first + (last - first) / 2
 
-    def aware_of(self, repainted_markings: Sequence[int] | NDArray[np.intp], lines: LinePoints) -> CameraMemory:
+    def aware_of(self, repainted_markings: Sequence[int] | NDArray[np.intp], lines: LinePoints) -> "CameraMemory":
         """Return the memory without what it knew of markings that were painted elsewhere."""
         aside = np.union1d(self.repainted_markings, repainted_markings).astype(int)
         if len(aside) == len(self.repainted_markings):
@@ -151,7 +149,7 @@ class CameraMemory:
         }
 
     @classmethod
-    def from_json(cls, document: Mapping[str, Any]) -> CameraMemory | None:
+    def from_json(cls, document: Mapping[str, Any]) -> "CameraMemory | None":
         """Return the memory that `to_json` wrote; None for one of another format or that cannot be read."""
         if document.get("format") != FORMAT:
             return None

@@ -4,8 +4,6 @@ It is kept as measurements and not as beliefs: what it says of lens, ground and 
 together with the lines of tonight, so that no error of an earlier answer confirms itself.
 """
 
-from __future__ import annotations
-
 import base64
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -49,12 +47,12 @@ class Epoch:
     last: datetime | None
 
     @classmethod
-    def from_job(cls, camera: Camera, measured: Measurements, lines: LinePoints, at: datetime | None) -> Epoch:
+    def from_job(cls, camera: Camera, measured: Measurements, lines: LinePoints, at: datetime | None) -> "Epoch":
         """Return the epoch of one job, whose answer was `camera`; `lines` of its field."""
         index, offset = _trusted(camera, measured, lines)
         return cls(camera, index, offset, np.ones(len(index)), 1, at, at)
 
-    def joined(self, camera: Camera, measured: Measurements, lines: LinePoints, at: datetime | None) -> Epoch:
+    def joined(self, camera: Camera, measured: Measurements, lines: LinePoints, at: datetime | None) -> "Epoch":
         """Return the epoch with one more job, whose answer was `camera` with the same lens."""
         new, value = _trusted(camera, measured, lines)
         count = np.zeros(len(lines))
@@ -71,7 +69,7 @@ class Epoch:
         mean = moved(self.camera, change_between(self.camera, camera) / min(self.jobs + 1, MOST_JOBS))
         return Epoch(mean, index, offset[index], count[index], self.jobs + 1, self.first, at or self.last)
 
-    def without(self, gone: NDArray[np.intp]) -> Epoch:
+    def without(self, gone: NDArray[np.intp]) -> "Epoch":
         """Return the epoch without some line points."""
         kept = ~np.isin(self.index, gone)
         return replace(self, index=self.index[kept], offset=self.offset[kept], count=self.count[kept])
@@ -108,7 +106,7 @@ class Epoch:
         }
 
     @classmethod
-    def from_json(cls, document: Mapping[str, Any]) -> Epoch:
+    def from_json(cls, document: Mapping[str, Any]) -> "Epoch":
         """Return the epoch that `to_json` wrote."""
         return cls(
             camera_from_json(document["camera"]),

@@ -6,8 +6,6 @@ tenths of a pixel tell these apart: of the changes that may be, those are taken 
 left (orthogonal matching pursuit; Pati, Rezaiifar and Krishnaprasad, 1993).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -64,7 +62,7 @@ class _Differences:
     across: Array
 
     @classmethod
-    def between(cls, last: Epoch, measured: Measurements, lines: LinePoints) -> _Differences:
+    def between(cls, last: Epoch, measured: Measurements, lines: LinePoints) -> "_Differences":
         """Return the differences at the line points that were measured well in the epoch and tonight."""
         # A mark that has moved across itself shows it at its sides, and one that is longer or shorter has not moved.
         measured = measured[~measured.points.end_to_end]

@@ -1,7 +1,5 @@
 """Calibration boards in photos: corners of a chessboard or a ChArUco board, to a part of a pixel."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

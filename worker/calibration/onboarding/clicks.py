@@ -1,7 +1,5 @@
 """Clicks on points of the field in a picture, and whether they can fix a pose at all."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -25,11 +23,11 @@ class Clicks:
     def __len__(self) -> int:
         return len(self.names)
 
-    def __getitem__(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> Clicks:
+    def __getitem__(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> "Clicks":
         index = np.arange(len(self))[chosen]
         return Clicks(tuple(self.names[i] for i in index), self.world[index], self.pixel[index])
 
-    def swapped(self, first: int, second: int) -> Clicks:
+    def swapped(self, first: int, second: int) -> "Clicks":
         """Return the clicks with the labels of two exchanged."""
         order = np.arange(len(self))
         order[[first, second]] = second, first

@@ -4,8 +4,6 @@ Before any fit, with the best pair of every proposed pose; after it, with every 
 other's points.
 """
 
-from __future__ import annotations
-
 from itertools import combinations
 
 import numpy as np

@@ -6,8 +6,6 @@ pose judged by all clicks, with any two labels exchanged if that explains more; 
 numbers as the clicks can justify, and what still does not fit is named.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 from worker.calibration.geometry.camera import Array, Camera

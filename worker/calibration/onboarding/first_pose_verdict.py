@@ -1,7 +1,5 @@
 """Verdict on a first pose: on each click, how sure the pose is, and what to do."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import comb
@@ -221,7 +219,6 @@ def _stands_behind_an_end(position: Array, landmarks: Mapping[str, Array]) -> bo
 
 
 def _lens_words(gain: LensGain) -> str:
-    """Return what was wrong with the lens, in words."""
     was, now = gain.before.camera.intrinsics.matrix, gain.after.camera.intrinsics.matrix
     parts = [f"focal length {was[0, 0]:.0f} -> {now[0, 0]:.0f} px"]
     if "centre x" in gain.after.free:

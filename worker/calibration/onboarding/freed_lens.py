@@ -4,8 +4,6 @@ A lens measured badly and a wrong label can pass for each other. So a lens is to
 what is very strong evidence, and clicks left out of it are foretold better.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 

@@ -5,8 +5,6 @@ fitted to, the simplest that foretells them as well as the best is taken, and ho
 are left out is told beside OpenCV's own standard deviations, which take each corner for an independent witness.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace

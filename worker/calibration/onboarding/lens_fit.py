@@ -1,7 +1,5 @@
 """Lens fit to boards in photos by OpenCV (Zhang's method), with the terms that are left free."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Poses proposed by triples of clicks, each judged by all clicks, any two labels exchanged if that explains more."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from itertools import combinations
 

@@ -6,8 +6,6 @@ can be compared between fits that doubt different clicks, and with a term for ea
 BIC) between fits of different lenses.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -201,7 +199,6 @@ class _Problem:
         return (there.with_lens(self._lens(then)) if self.index else there), then
 
     def _lens(self, change: Array) -> Lens:
-        """Return the lens with its free parameters changed."""
         by = np.zeros(len(FREE_PARAMETERS))
         by[self.index] = change
         matrix = self.lens.matrix.copy()

@@ -1,7 +1,5 @@
 """Paper's method on one page: the same frames and the same judgement, with its own search and without a refinement."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime

@@ -12,8 +12,6 @@ Kept for comparison: the far half of the pitch, mostly noise there, counts as mu
 `search/objective.py` says what ESC does instead.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations
@@ -181,7 +179,7 @@ class _PinholeView:
     matrix: Array
 
     @classmethod
-    def build(cls, camera: Camera, response: NDArray[np.float32]) -> _PinholeView:
+    def build(cls, camera: Camera, response: NDArray[np.float32]) -> "_PinholeView":
         """Undistort a response (H, W) onto as large a picture as holds all of it, at the frame's focal length."""
         lens = camera.intrinsics
         width, height = lens.size
@@ -219,7 +217,7 @@ class _Grid:
     surface: Array
 
     @classmethod
-    def covering(cls, pitch: Field) -> _Grid:
+    def covering(cls, pitch: Field) -> "_Grid":
         margin_m = 2.0
         origin = -np.array([pitch.length / 2 + margin_m, pitch.width / 2 + margin_m])
         size = tuple(COARSEST * ceil(-2 * side * PIXELS_PER_METRE / COARSEST) for side in origin)
@@ -228,7 +226,7 @@ class _Grid:
         planes, masks = _planes(surface)
         return cls(origin, size, planes, masks, surface)
 
-    def within(self, window: tuple[slice, slice]) -> _Grid:
+    def within(self, window: tuple[slice, slice]) -> "_Grid":
         """Return a part of the grid."""
         rows, columns = window
         size = (columns.stop - columns.start, rows.stop - rows.start)
@@ -281,7 +279,7 @@ class _Warp:
     boxes: list[tuple[int, int, Picture, Array]]
 
     @classmethod
-    def build(cls, grid: _Grid, view: _PinholeView, domain: Picture) -> _Warp:
+    def build(cls, grid: _Grid, view: _PinholeView, domain: Picture) -> "_Warp":
         boxes = []
         for plane, on_plane in zip(grid.planes, grid.on_plane, strict=True):
             mask = on_plane & domain

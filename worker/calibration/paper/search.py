@@ -1,7 +1,5 @@
 """Paper's search: the evolution strategy on the objective on the ground, from broad blurs to narrow ones."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -126,26 +124,18 @@ def _groups(
 ) -> list[_Group]:
     """One group per camera or one of all, each with its genes of the `population` (parents, 6 N), judged."""
     groups = []
-    for members in grouped(len(here), alone=level.alone):
-        cameras, seen = [here[i] for i in members], [responses[i] for i in members]
+    together = 1 if level.alone else len(here)
+    for first in range(0, len(here), together):
+        members = slice(first, first + together)
+        cameras, seen = here[members], responses[members]
         group = _Group(
-            EvolutionStrategy(strategy.parents, strategy.offspring, mutation_of(len(members)), rng),
+            EvolutionStrategy(strategy.parents, strategy.offspring, mutation_of(together), rng),
             GroundObjective(pitch, cameras, seen, stitch_weight, level.blurs),
             np.array([looked_at(camera) for camera in cameras]) if level.swings else None,
         )
-        group.begin_with(genes_of(members, population))
+        group.begin_with(population[:, POSE_NUMBERS * first : POSE_NUMBERS * (first + together)])
         groups.append(group)
     return groups
-
-
-def grouped(cameras: int, *, alone: bool) -> list[list[int]]:
-    """Return the numbers of the cameras that are searched for together: each `alone`, or all in one group."""
-    return [[number] for number in range(cameras)] if alone else [list(range(cameras))]
-
-
-def genes_of(members: Sequence[int], population: Array) -> Array:
-    """Return the genes (parents, 6 M) of M neighbouring cameras in a population (parents, 6 N)."""
-    return population[:, POSE_NUMBERS * members[0] : POSE_NUMBERS * (members[-1] + 1)]
 
 
 def _mean_loss(groups: Sequence[_Group]) -> float:

@@ -1,7 +1,5 @@
 """Genomes of cameras that swing about the ground that they look at: the `l` of the paper's K (R | l)."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from worker.calibration.geometry.camera import Array, Camera

@@ -1,7 +1,5 @@
 """Errors of places on the ground by the expected errors of poses, lenses and field."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from worker.calibration.geometry.camera import Array, Camera

@@ -1,7 +1,5 @@
 """State of the lines that a plan assumes, and the measurements that the line reader would make of them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal

@@ -4,8 +4,6 @@ The covariance is the engine's own, of the lines that the cameras would see (`re
 measurements are expected ones.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -104,7 +102,7 @@ class Plan:
         """Pixels (H, W) per metre in the camera that resolves a place best."""
         return np.fmax.reduce([one.px_per_metre for one in self.cameras])
 
-    def planner(self, cameras: Sequence[Camera]) -> Planner:
+    def planner(self, cameras: Sequence[Camera]) -> "Planner":
         """Return a planner of other cameras on the same field, by the same lines."""
         return Planner(self.pitch, cameras, self.state, self.hidden)
 

@@ -1,7 +1,5 @@
 """Cameras proposed for a stand: which way each of them looks, and how wide, so that together they see the field."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

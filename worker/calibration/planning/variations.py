@@ -1,7 +1,5 @@
 """Plans with one thing changed: a marking that is not there, a camera that stands higher, more overlap."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Warnings of a plan: what will not work, and what would help."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal

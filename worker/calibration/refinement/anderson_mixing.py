@@ -4,8 +4,6 @@ Weights, the unevenness of the ground and what is matched follow the poses only 
 comes nearer by a quarter a step. What the last steps left over says where that leads.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import pairwise
 

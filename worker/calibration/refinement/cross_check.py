@@ -6,8 +6,6 @@ both have part in. It should be about as large as the sigmas of both say, and mu
 (mrcal calls this cross-validation; Kogan, "mrcal", 2021).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,7 +1,5 @@
 """Diagnosis: given parameters of a lens or the field that the lines contradict, in words."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 

@@ -5,8 +5,6 @@ nothing. Where they do not (a lone touchline) it keeps the camera from running a
 how little is known.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -44,7 +42,7 @@ class Estimate:
     uneven_m: float
 
     @classmethod
-    def initial(cls, pitch: Field, cameras: Sequence[Camera], unknowns: Unknowns) -> Estimate:
+    def initial(cls, pitch: Field, cameras: Sequence[Camera], unknowns: Unknowns) -> "Estimate":
         """Return the estimate before any step."""
         return cls(
             pitch,
@@ -60,7 +58,7 @@ class Estimate:
         up = unknowns.ground.under_points(self.heights, np.arange(len(self.lines)))
         return replace(self.lines, position=self.lines.position + up[:, None] * [0.0, 0.0, 1.0])
 
-    def moved(self, move: Array, unknowns: Unknowns) -> Estimate:
+    def moved(self, move: Array, unknowns: Unknowns) -> "Estimate":
         """Return the estimate after a step (U,)."""
         poses, values, heights = np.split(move, [POSE_NUMBERS * unknowns.views, unknowns.dense])
         pitch, cameras = self.pitch, self.cameras
@@ -73,7 +71,7 @@ class Estimate:
         values, heights = self.values + values, self.heights + heights
         return replace(self, pitch=pitch, lines=lines, cameras=cameras, values=values, heights=heights)
 
-    def largest_move_m(self, other: Estimate) -> float:
+    def largest_move_m(self, other: "Estimate") -> float:
         """Return the largest move (m) of a view between two estimates; turns as shifts at `TURN_M`."""
         changes = [change_between(a, b) for a, b in zip(self.cameras, other.cameras, strict=True)]
         return max(float(np.linalg.norm(c[3:]) + TURN_M * np.linalg.norm(c[:3])) for c in changes)

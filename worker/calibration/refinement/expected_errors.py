@@ -1,7 +1,5 @@
 """Errors that a calibration would have, by the lines that its cameras would see: of a plan, before any frame exists."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property

@@ -4,8 +4,6 @@ Every epoch of a memory is one more view, with the mean of what it measured; it 
 view of tonight, so that what they have in common is known once and not twice (docs/model.md, 4).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -58,7 +56,7 @@ class Sandwich:
     spread: Array
 
     @classmethod
-    def of(cls, rows: Sequence[Rows], heights: Array, unknowns: Unknowns) -> Sandwich:
+    def of(cls, rows: Sequence[Rows], heights: Array, unknowns: Unknowns) -> "Sandwich":
         """Sum up rows on a ground of `heights` (K,)."""
         flat = weigh_rows(rows, heights, unknowns, tukey_weights)
         equations = normal_equations(flat)

@@ -10,8 +10,6 @@ shared by all views that measure it, and eliminated in closed form: so two camer
 together, and no measurement counts twice.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, pairwise
@@ -53,7 +51,7 @@ class Rows:
     point: NDArray[np.intp]
     measured: Measurements
 
-    def shifted(self, changes: Array, heights: Array, unknowns: Unknowns) -> Rows:
+    def shifted(self, changes: Array, heights: Array, unknowns: Unknowns) -> "Rows":
         """Return the rows after changes (D,) of the dense unknowns, on a ground of `heights` (K,).
 
         The misfit is smaller where a lens that was wrong has been corrected.
@@ -64,7 +62,7 @@ class Rows:
         return replace(self, offset=offset, noise_px=noise_px)
 
     @classmethod
-    def of(cls, positions: Array, camera: Camera, view: int, measured: Measurements, unknowns: Unknowns) -> Rows:
+    def of(cls, positions: Array, camera: Camera, view: int, measured: Measurements, unknowns: Unknowns) -> "Rows":
         """Return the rows of view number `view`; `positions` (N, 3): places of the field's line points."""
         here = positions[measured.index]
         parameters = unknowns.parameters_of(view)

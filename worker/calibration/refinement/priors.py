@@ -8,8 +8,6 @@ view and the next. A stored pose was fitted to lines through the stored lens on 
 these has moved it as it moves tonight's, and it is no witness of them (`_Errors.add_lasting`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

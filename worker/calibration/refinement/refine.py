@@ -3,8 +3,6 @@
 Found with the poses: how the ground swells, and whatever number of lens or field is left free.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
@@ -47,15 +45,15 @@ class Observations:
     responses: Sequence[NDArray[np.float32]]
 
     @classmethod
-    def of_lines_alone(cls, channels: Sequence[Channels]) -> Observations:
+    def of_lines_alone(cls, channels: Sequence[Channels]) -> "Observations":
         """Return the observations of frames that the network has not looked at."""
         return cls(channels, [NOT_LOOKED_AT] * len(channels))
 
-    def of(self, numbers: Sequence[int]) -> Observations:
+    def of(self, numbers: Sequence[int]) -> "Observations":
         """Return the observations of some of the cameras."""
         return Observations([self.channels[n] for n in numbers], [self.responses[n] for n in numbers])
 
-    def reader(self) -> LineReader:
+    def reader(self) -> "LineReader":
         """Return a reader of the lines in them."""
         return LineReader(self)
 
@@ -67,7 +65,7 @@ class LineReader:
         self._observations = observations
         self._read = dict(read)
 
-    def of(self, numbers: Sequence[int]) -> LineReader:
+    def of(self, numbers: Sequence[int]) -> "LineReader":
         """Return a reader for some of the cameras, with what has been read of them."""
         read = {at: self._read[n] for at, n in enumerate(numbers) if n in self._read}
         return LineReader(self._observations.of(numbers), read)
@@ -162,7 +160,7 @@ class _Refiner:
             return list(measured)
         return [found[~np.isin(found.points.marking, self.repainted)] for found in measured]
 
-    def around(self, estimate: Estimate) -> _Refiner:
+    def around(self, estimate: Estimate) -> "_Refiner":
         """Return the refinement for the field of an estimate, which steps may have changed."""
         return replace(self, unknowns=self.unknowns.around(estimate.pitch, estimate.lines))
 

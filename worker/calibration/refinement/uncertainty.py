@@ -6,8 +6,6 @@ every lens and of the field unknown: the poses that are then best are nearer the
 poses that are answered belongs to their error.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
@@ -81,7 +79,7 @@ class Sigma:
     position_m: float
 
     @classmethod
-    def from_covariance(cls, covariance: Array) -> Sigma:
+    def from_covariance(cls, covariance: Array) -> "Sigma":
         """Return the roots of the summed variances of a covariance (6, 6) of (rotation rad, position m)."""
         variances = np.diag(covariance)
         return cls(float(np.degrees(np.sqrt(variances[:3].sum()))), float(np.sqrt(variances[3:].sum())))
@@ -279,7 +277,7 @@ class _JointPosterior:
         return self.found.covariance
 
     @classmethod
-    def of(cls, estimate: Estimate, priors: Priors, information: MarginalInformation) -> _JointPosterior:
+    def of(cls, estimate: Estimate, priors: Priors, information: MarginalInformation) -> "_JointPosterior":
         by_errors = priors.mixing.T @ information.matrix @ priors.mixing
         found = _posterior(priors, information)
         # The movement of a camera helps to tell a zoom from a move. That it has not moved is no measurement of where it

@@ -1,7 +1,5 @@
 """Unknowns of the refinement's least squares, and their order."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -43,7 +41,7 @@ class Unknowns:
             if not isinstance(parameter, LensParameter) or parameter.camera in lenses
         ]
 
-    def around(self, pitch: Field, lines: LinePoints) -> Unknowns:
+    def around(self, pitch: Field, lines: LinePoints) -> "Unknowns":
         """Return the unknowns for a field that has been changed since."""
         parameters = [p.around(pitch, lines) if isinstance(p, FieldParameter) else p for p in self.parameters]
         return replace(self, parameters=parameters)

@@ -7,8 +7,6 @@ along the view look alike to the lines of a far camera; but a camera that moved 
 too, and so one that has not has zoomed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import chain, product

@@ -1,7 +1,5 @@
 """Agreement of hypotheses with a view, both ways: expected lines that are seen, and seen lines that are expected."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

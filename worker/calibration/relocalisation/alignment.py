@@ -5,8 +5,6 @@ Each point of a marking is drawn to the nearest paint, across its own line alone
 lines leave open stays as it was, by how far a hypothesis may be off.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -1,7 +1,5 @@
 """Candidates for the camera of a frame: proposed ones refined onto its measured lines, with the evidence for each."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -57,12 +55,12 @@ class FrameObservations:
     paint: Paint
 
     @classmethod
-    def of(cls, field: Field, channels: Channels, response: Response) -> FrameObservations:
+    def of(cls, field: Field, channels: Channels, response: Response) -> "FrameObservations":
         """Return the observations of a frame by the response (H, W) of the network, 0..1."""
         small = np.rint(response * 255).astype(np.uint8)
         return cls(field, Observations([channels], [response]), small, Paint.of(small))
 
-    def strengthened(self, times: float) -> FrameObservations:
+    def strengthened(self, times: float) -> "FrameObservations":
         """Return the observations of this frame for a network that is so many `times` as sure."""
         (channels,), (response,) = self.observations.channels, self.observations.responses
         return FrameObservations.of(self.field, channels, np.minimum(np.float32(times) * response, np.float32(1.0)))

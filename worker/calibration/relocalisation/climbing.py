@@ -1,7 +1,5 @@
 """Evolution strategy from many hypotheses to few: narrower tolerances, smaller steps, the best ones apart."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

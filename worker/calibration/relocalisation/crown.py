@@ -4,8 +4,6 @@ A site that says nothing of its ridge is searched as flat. Where all its cameras
 together how high the ridge is, if there is one.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial

@@ -1,7 +1,5 @@
 """Random hypotheses at the usual places of cameras beside fields, where too few straight lines are seen."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from worker.calibration.geometry.camera import Array

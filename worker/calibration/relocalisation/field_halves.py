@@ -1,7 +1,5 @@
 """Side from which cameras look at a symmetric field: by what is said of them, or by each other."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Maps of a field's markings for a search over all poses: points to project, and distances on the ground."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -34,7 +32,7 @@ class FieldMap:
     half_size: Array
 
     @classmethod
-    def of(cls, field: Field) -> FieldMap:
+    def of(cls, field: Field) -> "FieldMap":
         """Return the map of a field, its roof included; spots are too small to be seen from afar."""
         lines = [marking for marking in field.markings() if not marking.spot]
         fine_m = 0.1

@@ -4,8 +4,6 @@ Lines of other sports hide the field's from a search that sees all of them. Whic
 more: each is drawn alone, and it is the one whose lines some camera explains best.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import cv2

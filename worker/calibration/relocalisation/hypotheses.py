@@ -1,7 +1,5 @@
 """Population of camera hypotheses: rotations, positions, focal lengths and bends, as arrays of one length."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,18 +27,18 @@ class Hypotheses:
     bends: Array
 
     @classmethod
-    def unbent(cls, rotations: Array, positions: Array, focal_px: Array) -> Hypotheses:
+    def unbent(cls, rotations: Array, positions: Array, focal_px: Array) -> "Hypotheses":
         """Return cameras whose lenses bend as the one that undistorted the view."""
         return cls(rotations, positions, focal_px, np.zeros(len(positions)))
 
     def __len__(self) -> int:
         return len(self.positions)
 
-    def __getitem__(self, chosen: NDArray[np.intp] | NDArray[np.bool_] | slice) -> Hypotheses:
+    def __getitem__(self, chosen: NDArray[np.intp] | NDArray[np.bool_] | slice) -> "Hypotheses":
         return take_rows(self, chosen)
 
     @classmethod
-    def joined(cls, several: list[Hypotheses]) -> Hypotheses:
+    def joined(cls, several: "list[Hypotheses]") -> "Hypotheses":
         """Return all cameras of several populations."""
         return cls(
             np.concatenate([one.rotations for one in several] or [np.zeros((0, 3, 3))]),

@@ -5,8 +5,6 @@ perpendicular to x: n_y (m - C_y) = n_z C_z. So each image line along x measures
 those along y measure b = (m - C_x) / C_z: to find the position is to match numbers on two axes with one scale.
 """
 
-from __future__ import annotations
-
 from itertools import combinations, permutations
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Lines of a frame without the distortion of its lens: segments, places on paint, distances to paint."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 
@@ -40,7 +38,7 @@ class LineView:
     roll_sigma: float
 
     @classmethod
-    def of(cls, response: NDArray[np.uint8], lens: Lens, roll_sigma_deg: float) -> LineView:
+    def of(cls, response: NDArray[np.uint8], lens: Lens, roll_sigma_deg: float) -> "LineView":
         """Return the view of a response (height, width), 0..255, of the network through `lens`."""
         width, height = lens.size
         scale = WIDTH_PX / width

@@ -1,7 +1,5 @@
 """Paint that a frame shows, and the share of it that a camera explains."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import cv2
@@ -24,7 +22,7 @@ class Paint:
     middles: NDArray[np.intp]
 
     @classmethod
-    def of(cls, response: NDArray[np.uint8]) -> Paint:
+    def of(cls, response: NDArray[np.uint8]) -> "Paint":
         """Return the paint in a response (height, width), 0..255, of the network."""
         height, width = response.shape
         size = (WIDTH_PX, round(height * WIDTH_PX / width))

@@ -1,7 +1,5 @@
 """Proposals of poses from a frame's lines and the field alone: the whole search, top to bottom."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

@@ -4,8 +4,6 @@ A first pose has no stored one beside it. In place of "moved" and "the stored po
 clearly different pose explains the frame nearly as well.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal

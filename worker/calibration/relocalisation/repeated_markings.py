@@ -4,8 +4,6 @@ Yard lines that lie evenly explain a view from every place that is so many yards
 four, and a search that climbs does not leave the one it ends at. What tells those places apart few pixels show.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from worker.calibration.geometry.camera import Array

@@ -1,7 +1,5 @@
 """Cameras whose lines several poses explain, told apart by other cameras that see the same ground."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 

@@ -5,8 +5,6 @@ the plane is perpendicular to it. Long segments vote for rotations whose x or y 
 is what vanishing points say, without having to choose which segments meet in one.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,7 +25,7 @@ class Direction:
     focal_px: float
     votes: float
 
-    def is_like(self, other: Direction, apart_deg: float) -> bool:
+    def is_like(self, other: "Direction", apart_deg: float) -> bool:
         """True if both differ by less than `apart_deg`, and by 4 % of focal length."""
         if abs(np.log(self.focal_px / other.focal_px)) > 0.04:
             return False

@@ -5,8 +5,6 @@ Lines repeat themselves along a field and from one half to the other. What is be
 shadows, lettering, players' feet. Cameras of one job have taken their frames at about the same moment.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -55,10 +53,10 @@ class SharedGround:
     places: Array
     from_paint: NDArray[np.float32]
     frames: Mapping[str, Frame]
-    _textures: dict[tuple[str, bytes], _Texture] = field(default_factory=dict, init=False, repr=False)
+    _textures: "dict[tuple[str, bytes], _Texture]" = field(default_factory=dict, init=False, repr=False)
 
     @classmethod
-    def of(cls, pitch: Field, frames: Mapping[str, Frame]) -> SharedGround:
+    def of(cls, pitch: Field, frames: Mapping[str, Frame]) -> "SharedGround":
         """Return the ground of a field and a little around it."""
         lines = pitch.line_points().position[:, :2]
         beside_m = 3.0
@@ -83,7 +81,7 @@ class SharedGround:
         alike = np.array([[texture.correlation(other) for other in seen.values()] for texture in textures])
         return GroundComparison(alike.max(axis=1), [list(seen)[number] for number in alike.argmax(axis=1)])
 
-    def _texture(self, camera: Camera) -> _Texture:
+    def _texture(self, camera: Camera) -> "_Texture":
         """Return the texture that a frame shows by this pose and lens; each such pair is computed once."""
         pose, lens = camera.pose, camera.intrinsics
         numbers = np.concatenate([pose.rotation, pose.position, lens.matrix.ravel(), lens.distortion])
@@ -92,7 +90,7 @@ class SharedGround:
             self._textures[key] = self._look_at(camera)
         return self._textures[key]
 
-    def _look_at(self, camera: Camera) -> _Texture:
+    def _look_at(self, camera: Camera) -> "_Texture":
         pixels = camera.project(self.pitch.lift(self.places))
         within = inside(pixels, camera.intrinsics.size)
         values, px = sampled(self.frames[camera.id], pixels, within), _least_px(pixels)
@@ -111,7 +109,7 @@ class _Texture:
     contrast: NDArray[np.float32]
     seen: NDArray[np.bool_]
 
-    def correlation(self, other: _Texture) -> float:
+    def correlation(self, other: "_Texture") -> float:
         """Return the correlation of the places that both cameras see, -1..1; 0 where these are too few."""
         both = self.seen & other.seen
         if np.count_nonzero(both) < 4000:

@@ -1,7 +1,5 @@
 """Prior knowledge of a camera whose pose is sought: its lens, or the range of its focal length, and its rough place."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -34,12 +32,12 @@ class SoughtLens:
     is_bend_known: bool = True
 
     @classmethod
-    def known(cls, lens: Lens) -> SoughtLens:
+    def known(cls, lens: Lens) -> "SoughtLens":
         """Return a lens with its focal length."""
         return cls(lens, lens.focal_length_px, lens.focal_length_px)
 
     @classmethod
-    def around(cls, lens: Lens, uncertain: float) -> SoughtLens:
+    def around(cls, lens: Lens, uncertain: float) -> "SoughtLens":
         """Return a lens with this relative sigma of its focal length, which a small one makes known."""
         # Relative sigma of a focal length that needs no search.
         if uncertain <= 0.02:

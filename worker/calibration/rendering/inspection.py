@@ -1,16 +1,14 @@
 """Pictures by which a person judges a lens and a first pose: the evidence, and how well it fits."""
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 
-from worker.calibration.geometry.camera import Array, Camera, Frame
+from worker.calibration.geometry.camera import Array, Frame
 from worker.calibration.geometry.field import Field
 from worker.calibration.onboarding.clicks import Clicks
 from worker.calibration.onboarding.first_pose_verdict import FirstPose
 from worker.calibration.onboarding.lens_calibration import LensCalibration
-from worker.calibration.rendering.overlays import draw_line, legend, outline
+from worker.calibration.rendering.overlays import centre_lines, draw_line, legend
 from worker.calibration.rendering.palette import PICTURE_WIDTH_PX, Palette
 
 
@@ -55,7 +53,8 @@ def clicks_picture(pitch: Field, clicks: Clicks, found: FirstPose, frame: Frame 
     width, height = found.camera.intrinsics.size
     picture = np.full((height, width, 3), Palette.PAPER, np.uint8) if frame is None else frame.copy()
     thick = max(1, round(width / 1500))
-    _draw_pitch(picture, pitch, found.camera, thick)
+    for line in centre_lines(pitch, found.camera):
+        draw_line(picture, line, Palette.NEW, thick)
     expected = found.camera.project(clicks.world)
     clicked = (60, 200, 60)
     mislabelled = (40, 40, 240)
@@ -68,12 +67,6 @@ def clicks_picture(pitch: Field, clicks: Clicks, found: FirstPose, frame: Frame 
     entries = [("pitch at the first pose", Palette.NEW), ("click", clicked), ("where its label is", Palette.EXPECTED)]
     legend(picture, [*entries, ("does not fit its label", mislabelled)])
     return picture
-
-
-def _draw_pitch(picture: Frame, pitch: Field, camera: Camera, thick: int) -> None:
-    for marking in pitch.markings():
-        centre, *_ = outline(marking)
-        draw_line(picture, camera.project(pitch.lift(centre)), Palette.NEW, thick)
 
 
 def _cross(picture: Frame, place: Array, colour: tuple[int, int, int], arm: int) -> None:

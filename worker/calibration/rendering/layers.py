@@ -1,7 +1,5 @@
 """Transparent pictures, BGRA, to be laid over a frame or the preview: what a person switches on and off to compare."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import cv2
@@ -10,7 +8,7 @@ from numpy.typing import NDArray
 
 from worker.calibration.geometry.camera import Array, Camera
 from worker.calibration.geometry.field import Field
-from worker.calibration.rendering.overlays import EDGE_GAP, draw_line, frame_of, outline
+from worker.calibration.rendering.overlays import EDGE_GAP, centre_lines, draw_line, frame_of
 from worker.calibration.rendering.palette import Palette
 
 Layer = NDArray[np.uint8]
@@ -18,9 +16,8 @@ Layer = NDArray[np.uint8]
 
 def stored_layer(pitch: Field, camera: Camera, size: tuple[int, int]) -> Layer:
     """Draw the centre of each marking by the stored pose; `size`: width, height of the picture it is laid over."""
-    lines = [camera.project(pitch.lift(outline(marking)[0])) for marking in pitch.markings()]
     # Two strokes of the new pose frame what one of the stored pose hits.
-    return _of(Palette.STORED, _strokes(camera, lines, size, _thickness(0.0016, size)))
+    return _of(Palette.STORED, _strokes(camera, centre_lines(pitch, camera), size, _thickness(0.0016, size)))
 
 
 def new_layer(pitch: Field, camera: Camera, size: tuple[int, int]) -> Layer:

@@ -1,7 +1,5 @@
 """Markings in words and colours on the frame, so that a person finds the line that is meant."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import cv2

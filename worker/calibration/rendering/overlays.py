@@ -1,7 +1,5 @@
 """The pitch drawn on a frame: by the stored pose and by the new one, each told from the other by its colour."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import cv2
@@ -37,8 +35,8 @@ def overlay(
     pitch, camera = stored
     if camera.ignored is not None:
         picture[camera.ignored.area] //= 2
-    for marking in pitch.markings():
-        draw_line(picture, camera.project(pitch.lift(outline(marking)[0])), Palette.STORED, max(1, round(width / 1600)))
+    for line in centre_lines(pitch, camera):
+        draw_line(picture, line, Palette.STORED, max(1, round(width / 1600)))
     thickness = max(1, round(width / 3000))
     pitch, camera = new
     colours = colours_of(pitch, seen)
@@ -76,6 +74,11 @@ def outline(marking: Marking) -> list[Array]:
     along /= np.linalg.norm(along, axis=-1, keepdims=True)
     across = marking.width / 2 * np.stack([-along[:, 1], along[:, 0]], axis=-1)
     return [centre, centre + across, centre - across]
+
+
+def centre_lines(pitch: Field, camera: Camera) -> list[Array]:
+    """Return the centre line of each marking in a camera's pixels, (n, 2) each."""
+    return [camera.project(pitch.lift(outline(marking)[0])) for marking in pitch.markings()]
 
 
 def frame_of(pitch: Field, camera: Camera, marking: Marking, gap: float) -> list[Array]:

@@ -1,7 +1,5 @@
 """Colours of all pictures: each means one thing in every one of them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 BGR = tuple[int, int, int]

@@ -1,7 +1,5 @@
 """Maps of a plan: the field from above, coloured by what the cameras would make of each place."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -3,8 +3,6 @@
 The picture without distortion has the size and the camera matrix of the frame. Maps hold the lens alone, not the pose.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

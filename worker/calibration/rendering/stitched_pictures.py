@@ -1,7 +1,5 @@
 """Pictures stitched from all cameras for people: the preview, from between the cameras, and the bird's-eye view."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType

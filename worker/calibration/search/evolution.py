@@ -4,8 +4,6 @@ A genome is 6 numbers per camera: rotation vector (rad) and position (m). Nothin
 mutation has one strength per gene, and whole populations are arrays (individuals, genes).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Genomes: poses as vectors that can be mutated and mixed, per camera a rotation vector and a position."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -9,8 +9,6 @@ the segmentation is band-passed (blurred minus blurred more), so a response besi
 a point earns at most the height that its line has after the blur, so thick false alarms earn no more than a line.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import sqrt
 
@@ -42,11 +40,11 @@ class Objective:
     points: Plane
     height: Response
     weight: Response
-    band: BlurredResponse
+    band: "BlurredResponse"
     intrinsics: Lens
 
     @classmethod
-    def build(cls, pitch: Field, camera: Camera, response: Response, blur_px: float) -> Objective:
+    def build(cls, pitch: Field, camera: Camera, response: Response, blur_px: float) -> "Objective":
         """Return the loss of the markings that `camera` sees from the pose a level starts from.
 
         `response`: its segmentation (H, W) in 0..1; `blur_px`: standard deviation of the blur, in pixels of a 4K frame.
@@ -82,7 +80,7 @@ class BlurredResponse:
     shrink: int
 
     @classmethod
-    def from_response(cls, response: Response, sigma: float) -> BlurredResponse:
+    def from_response(cls, response: Response, sigma: float) -> "BlurredResponse":
         """Blur (H, W) by `sigma` px; coarse blurs are kept at a coarse size, where sampling stays in the cache."""
         shrink = max(1, 2 ** int(np.log2(max(sigma / 2, 1))))
         bottom, right = -response.shape[0] % shrink, -response.shape[1] % shrink
@@ -95,7 +93,7 @@ class BlurredResponse:
         blurred = cv2.GaussianBlur(small, (0, 0), remaining, borderType=cv2.BORDER_CONSTANT)
         return cls(np.asarray(blurred, dtype=np.float32), shrink)
 
-    def minus(self, coarser: BlurredResponse) -> BlurredResponse:
+    def minus(self, coarser: "BlurredResponse") -> "BlurredResponse":
         """Return the difference to a coarser blur of the same picture."""
         finer = coarser.shrink // self.shrink
         height, width = self.values.shape

@@ -1,7 +1,5 @@
 """From stored poses to new ones: the evolution strategy over levels of blur, from coarse to fine."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial

@@ -1,7 +1,5 @@
 """Part of a stitched view that no camera sees."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

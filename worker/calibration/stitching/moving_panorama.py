@@ -4,8 +4,6 @@ What changes from frame to frame is where a pixel of the view lies in the frames
 computed at few places of the view, exactly, and interpolated: a hundredth of a new panorama's projections.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 

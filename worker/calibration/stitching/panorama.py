@@ -4,8 +4,6 @@ A panorama is geometry: it holds until a pose, a lens, the view or the light of 
 frames go through it (`Panorama.picture`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

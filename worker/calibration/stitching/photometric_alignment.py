@@ -1,7 +1,5 @@
 """Photometric alignment of cameras in a stitched view by the places that several of them show, and its best seams."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -97,7 +95,7 @@ class _Overlap:
     difference: Array
 
     @classmethod
-    def of(cls, i: int, j: int, seen: Sequence[_Seen]) -> _Overlap:
+    def of(cls, i: int, j: int, seen: Sequence[_Seen]) -> "_Overlap":
         """Return the equations of cameras number i and j."""
         both = seen[i].valid & seen[j].valid
         design = np.zeros((np.count_nonzero(both), 3, 2, UNKNOWNS))

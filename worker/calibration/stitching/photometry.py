@@ -1,7 +1,5 @@
 """Photometric correction of a camera's picture: exposure, white balance, darker corners, and the place of its seam."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -39,7 +37,7 @@ class Light:
         """Return the further factor on pixels (..., 2) of a frame of `size` (width, height)."""
         return np.exp(np.float32(self.falloff) * squared_radius(pixels, size))
 
-    def after(self, before: Light | None) -> Light:
+    def after(self, before: "Light | None") -> "Light":
         """Return the correction smoothed with the one `before`: a cloud moves only a part of it."""
         if before is None:
             return self
@@ -52,7 +50,7 @@ class Light:
         return np.array([*np.log(self.gain), self.contrast, self.falloff, self.reach])
 
     @classmethod
-    def of(cls, numbers: Array) -> Light:
+    def of(cls, numbers: Array) -> "Light":
         """Return the correction of its `numbers`."""
         blue, green, red = np.exp(numbers[:3]).tolist()
         return cls((blue, green, red), *map(float, numbers[3:]))

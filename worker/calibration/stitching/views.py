@@ -1,7 +1,5 @@
 """Stitched views: virtual cameras, and the world behind their pixels."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal, Protocol

@@ -1,7 +1,5 @@
 """Tracker of an installation's cameras through a clip: lines frame by frame, the filter over time."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal

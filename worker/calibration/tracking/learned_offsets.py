@@ -1,7 +1,5 @@
 """Offsets of pieces of line from their place in the model, learned from sights and faded by time."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -4,8 +4,6 @@ Lens, paint and ground put each piece of line a little beside where the model ha
 is learned, piece by piece, while the clip runs: otherwise the pose would jump whenever a player hides some of them.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,7 +22,6 @@ from worker.calibration.refinement.least_squares import CLUSTER_POINTS
 from worker.calibration.robust import huber_weights, tukey_weights
 from worker.calibration.tracking.learned_offsets import LearnedOffsets
 from worker.calibration.tracking.motion_filter import PoseObservation
-from worker.calibration.tracking.telling_pieces import most_telling
 
 FEW, LEARNING = 200, 25
 """Number of pieces that are looked at after `LEARNING` looks at all of them."""
@@ -52,7 +49,7 @@ class LineObservations:
     jacobian: Array
     share: float
 
-    def __getitem__(self, chosen: NDArray[np.bool_]) -> LineObservations:
+    def __getitem__(self, chosen: NDArray[np.bool_]) -> "LineObservations":
         return take_rows(self, chosen)
 
 
@@ -259,3 +256,24 @@ class TrackedLines:
         sums = np.zeros((len(patches), POSE_NUMBERS))
         np.add.at(sums, patch, gradients)
         return sums.T @ sums
+
+
+def most_telling(jacobian: Array, patch: NDArray[np.intp], prior: Array, count: int) -> NDArray[np.intp]:
+    """Return indices, rising, of up to `count` of N pieces that leave least open of a pose (D-optimal, greedily).
+
+    `jacobian` (N, 6): how far each moves, in its own standard deviation, per unit of the pose; `patch` (N,): pieces of
+    one err together, so each further one of a patch counts for less; `prior` (6, 6): information without any piece.
+    """
+    covariance = np.asarray(np.linalg.inv(prior), float)
+    share = np.ones(len(jacobian))
+    chosen: list[int] = []
+    for _ in range(min(count, len(jacobian))):
+        reach = jacobian @ covariance
+        gain = share**2 * np.einsum("nj,nj->n", reach, jacobian)
+        gain[chosen] = -np.inf
+        best = int(np.argmax(gain))
+        covariance -= np.outer(reach[best], reach[best]) * share[best] ** 2 / (1 + gain[best])
+        chosen.append(best)
+        alike = np.flatnonzero(patch == patch[best])
+        share[alike] = 1 / (1 + np.count_nonzero(np.isin(chosen, alike)))
+    return np.sort(np.array(chosen, dtype=np.intp))

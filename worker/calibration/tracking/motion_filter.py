@@ -3,8 +3,6 @@
 A state (12,) is a change (6,) of the pose beside a reference (see `geometry.derivatives`) and its velocity, per second.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -38,7 +36,7 @@ class State:
     covariance: Array
 
     @classmethod
-    def at_reference(cls, information: Array) -> State:
+    def at_reference(cls, information: Array) -> "State":
         """Return the state of a camera at its reference, known to this information (6, 6), with unknown velocity."""
         place = np.linalg.inv(information + np.diag(np.repeat([BACK_RAD, BACK_M], 3) ** -2.0))
         # The velocity when the clip begins.
@@ -56,12 +54,12 @@ class State:
         """Covariance (6, 6) of the change."""
         return self.covariance[:POSE_NUMBERS, :POSE_NUMBERS]
 
-    def after(self, seconds: float) -> State:
+    def after(self, seconds: float) -> "State":
         """Return the state predicted so long after."""
         transition = _transition(seconds)
         return State(transition @ self.mean, transition @ self.covariance @ transition.T + _process_noise(seconds))
 
-    def with_mast_prior(self, seconds: float) -> State:
+    def with_mast_prior(self, seconds: float) -> "State":
         """Return the state with the prior of a mast over so long a time: next to nothing where lines are seen."""
         information = np.diag(np.repeat([BACK_RAD, BACK_M], 3) ** -2.0) * seconds
         return self.with_observed(PoseObservation(np.zeros(POSE_NUMBERS), information))
@@ -71,7 +69,7 @@ class State:
         innovation, root, innovation_covariance = self._innovation(observed)
         return float(innovation @ root @ np.linalg.solve(innovation_covariance, root.T @ innovation))
 
-    def with_observed(self, observed: PoseObservation) -> State:
+    def with_observed(self, observed: PoseObservation) -> "State":
         """Return the state updated by a frame, in Joseph's form: a covariance that stays one."""
         innovation, root, innovation_covariance = self._innovation(observed)
         gain = np.linalg.solve(innovation_covariance, (self.covariance[:, :POSE_NUMBERS] @ root).T).T

@@ -4,8 +4,6 @@ What comes is a `StitchRequest` and, for a picture, frames; what leaves is a zip
 JPEG.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 from collections.abc import Mapping
@@ -15,7 +13,6 @@ from dataclasses import replace
 import cv2
 
 from service import child_process
-from service.schemas.programs.files import split_files
 from service.schemas.programs.stitching import StitchRequest
 from worker.calibration.rendering.layers import seam_layer
 from worker.calibration.stitching.panorama import Contribution, Panorama, panorama
@@ -40,15 +37,10 @@ MOST_PLACES = 40_000_000
 def main() -> None:
     """Read what is wanted, write it."""
     child_process.begin_decoder()
-    data = sys.stdin.buffer.read()
-    end = data.index(b"\n")
-    request = StitchRequest.model_validate_json(data[:end])
+    request, files = StitchRequest.decode(sys.stdin.buffer.read())
     cv2.setNumThreads(request.threads)
     made = stitched(request)
-    if request.wanted == "picture":
-        answer = encode_jpeg(picture(request, made, split_files(data[end + 1 :], request.sizes)))
-    else:
-        answer = package(request, made)
+    answer = encode_jpeg(picture(request, made, files)) if request.wanted == "picture" else package(request, made)
     sys.stdout.buffer.write(answer)
 
 

@@ -5,8 +5,6 @@ the right and further down, which costs no copy, and `maskedmerge` interpolates 
 any other tool, and lines stay smooth. Only the part of the view that a camera sees is computed of it.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

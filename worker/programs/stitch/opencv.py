@@ -1,7 +1,5 @@
 """A stitched view for OpenCV: a file of NumPy's, and what uses it."""
 
-from __future__ import annotations
-
 import io
 from pathlib import Path
 from typing import Any

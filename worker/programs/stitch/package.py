@@ -1,7 +1,5 @@
 """The zip that a stitched view leaves in: the files of a format, what holds of them, and how to use them."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from functools import partial

@@ -1,7 +1,5 @@
 """Size to which a frame is scaled before a view is sampled from it, by tools that know no levels of detail."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -1,7 +1,5 @@
 """A stitched view as ST maps: an EXR file of each camera, where to sample its frame and how much it counts."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 import numpy as np

@@ -5,7 +5,7 @@ import numpy as np
 from testbed.synthetic import CROWNED, pair
 from worker.calibration.geometry.derivatives import pixel_jacobian
 from worker.calibration.geometry.visibility import VisibleLines
-from worker.calibration.tracking.telling_pieces import most_telling
+from worker.calibration.tracking.line_observations import most_telling
 
 PRIOR = np.diag(np.repeat([0.03, 1.0], 3) ** -2.0)
 
