@@ -43,10 +43,13 @@ def _pan_tilt_roll(o: Matrix) -> tuple[float, float, float]:
     """Return the z-x-z angles, in radians, of an orientation (3, 3)."""
     level = math.hypot(o[2][0], o[2][1])
     tilt = math.atan2(level, o[2][2])
-    if level < 1e-9:
+    if level == 0:
         # Straight down or up: pan and roll turn about the same axis; the pan takes it all.
         return math.atan2(o[1][0], o[0][0]), tilt, 0.0
-    return math.atan2(o[0][2], -o[1][2]), tilt, math.atan2(o[2][0], o[2][1])
+    pan = math.atan2(o[0][2], -o[1][2])
+    # What is left: nearly straight down, pan and roll are hardly known one by one, but well together.
+    left = product(transposed(product(_about_z(pan), _about_x(tilt))), o)
+    return pan, tilt, math.atan2(left[1][0], left[0][0])
 
 
 def recognises(file: ParsedFile) -> bool:

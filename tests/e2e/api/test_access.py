@@ -40,6 +40,7 @@ OTHERWISE = {
     ("GET", "/ui/venues/{venue_id}/settings"): "admin",
     ("GET", "/ui/venues/{venue_id}/first-pose"): "admin",
     ("GET", "/ui/venues/{venue_id}/find"): "calibrate",
+    ("GET", "/ui/plan"): "calibrate",
     ("GET", "/ui/new-venue"): "admin",
     ("GET", "/ui/new-venue/by-hand"): "admin",
     ("POST", "/ui/new-venue/plan"): "read",

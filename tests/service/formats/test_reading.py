@@ -67,6 +67,15 @@ def is_optional(files):
     return frozenset(name for name in files if "points3D" in name)
 
 
+@pytest.mark.parametrize("rotation", [[0, 4.8e-9, 4.8e-9], [3e-10, 8e-10, 0.5], [1e-8, 1e-8, -2]])
+def test_soccernet_holds_a_camera_that_looks_almost_straight_up(rotation):
+    """Its pan and roll turn about nearly the same axis."""
+    lens = Intrinsics(matrix=[[900, 0, 640.3], [0, 900, 360.3], [0, 0, 1]], distortion=[])
+    camera = CameraRecord("left", lens, (1280, 720), Pose.from_position(rotation, [1, 2, 20]))
+    (again,) = read_files(written("soccernet", [camera])).cameras
+    assert again.pose.rotation == pytest.approx(rotation, rel=0, abs=1e-10)
+
+
 @pytest.mark.parametrize("form", FILE_FORMATS)
 @given(cameras())
 @settings(max_examples=10, deadline=None)
