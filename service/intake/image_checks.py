@@ -7,7 +7,6 @@ turn them by the EXIF orientation, and what the calibration sees is not turned.
 
 from __future__ import annotations
 
-import re
 import struct
 import zlib
 from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -15,7 +14,7 @@ from dataclasses import dataclass
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
-from service.schemas.file_kinds import JPEG_START, PNG_START, jpeg_begins_at, kind_of_file
+from service.schemas.file_kinds import JPEG_SCAN, JPEG_START, PNG_START, jpeg_begins_at, jpeg_segments, kind_of_file
 from service.schemas.find import SoughtCameraIn, SoughtSite
 from service.schemas.frame_sizes import is_resized, other_shape, other_size
 from service.schemas.problems import Problem
@@ -24,11 +23,6 @@ from service.schemas.venue import Camera, Venue
 if TYPE_CHECKING:
     from service.settings import Settings
 
-# A marker inside entropy-coded data: FF and neither a stuffed 00, nor a restart (D0 to D7), nor a fill byte FF.
-JPEG_MARKER = re.compile(rb"\xff([^\x00\xd0-\xd7\xff])")
-JPEG_END, JPEG_SCAN = 0xD9, 0xDA
-# Bytes FF before a marker fill up, as many as there are.
-NOT_FILLED = re.compile(rb"[^\xff]")
 # A camera's JPEG has tens of parts, a progressive one hundreds. PNG encoders cut pixels into chunks of 4 kB and more.
 # Walking a million would take seconds, in which nobody else is answered.
 MOST_SEGMENTS, MOST_CHUNKS = 10_000, 50_000
@@ -184,7 +178,7 @@ class Outline:
 def _jpeg(data: bytes, begin: int) -> Outline:
     """Walk the segments to the end-of-image marker; cameras write what they like behind it."""
     position, size = begin + 2, None
-    for number, (position, marker) in enumerate(_jpeg_segments(data, begin)):
+    for number, (position, marker) in enumerate(jpeg_segments(data, begin)):
         if number >= MOST_SEGMENTS:
             raise TooManyParts(f"more than {MOST_SEGMENTS} segments")
         if marker in JPEG_FRAMES:
@@ -197,35 +191,6 @@ def _jpeg(data: bytes, begin: int) -> Outline:
     if not size or min(size) < 1:
         raise ValueError("no size")
     return Outline(size, data[position : position + 2] == b"\xff\xd9")
-
-
-def _jpeg_segments(data: bytes, begin: int) -> Iterator[tuple[int, int]]:
-    """Yield position and code of each marker, up to end-of-image after a scan or to the end of the data."""
-    position, scanned = begin + 2, False
-    while position + 2 <= len(data):
-        if data[position] != 0xFF:
-            raise ValueError("no marker where one must be")
-        marker = data[position + 1]
-        if marker == 0xFF:
-            filled = NOT_FILLED.search(data, position)
-            if filled is None:
-                return
-            position = filled.start() - 1
-            continue
-        yield position, marker
-        if marker == JPEG_END:
-            if not scanned:
-                raise ValueError("no picture")
-            return
-        if position + 4 > len(data):
-            return
-        position += 2 + struct.unpack_from(">H", data, position + 2)[0]
-        if marker == JPEG_SCAN:
-            scanned = True
-            following = JPEG_MARKER.search(data, position)
-            if following is None:
-                return
-            position = following.start()
 
 
 def _png(data: bytes) -> Outline:

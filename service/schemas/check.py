@@ -4,11 +4,11 @@ from typing import Annotated, Literal
 
 from pydantic import ConfigDict, Field
 
-from service.schemas.base import OPEN_WORD, Id, Integer, Schema
+from service.schemas.base import OPEN_WORD, Id, Schema
 from service.schemas.field import FieldOfPlay
 from service.schemas.geometry import Intrinsics, Pose
 from service.schemas.names import FormatName
-from service.schemas.options import Handling
+from service.schemas.options import Handling, Seed
 
 Grade = Literal["good", "drifted", "wrong", "cannot-tell"]
 # From the worst: the grade of a file is that of its worst camera.
@@ -21,7 +21,7 @@ class CheckOptions(Handling):
     model_config = ConfigDict(json_schema_extra={"examples": [{"field": {"template": "tennis"}}]})
 
     field: FieldOfPlay
-    seed: Annotated[Integer, Field(ge=0, le=2**53 - 1)] | None = Field(None, description="Absent: one is chosen.")
+    seed: Seed | None = Field(None, description="Absent: one is chosen.")
 
 
 class CheckedCamera(Schema):

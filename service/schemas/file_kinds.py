@@ -1,7 +1,16 @@
-"""Recognition of file types by their first bytes, for error messages about files that are no JPEG or PNG."""
+"""Recognition of file types by their first bytes, for messages about those that are no JPEG or PNG; parts of a JPEG."""
+
+import re
+import struct
+from collections.abc import Iterator
 
 JPEG_START = b"\xff\xd8\xff"
 JPEG_BEGIN = b"\xff\xd8"
+# A marker inside entropy-coded data: FF and neither a stuffed 00, nor a restart (D0 to D7), nor a fill byte FF.
+JPEG_MARKER = re.compile(rb"\xff([^\x00\xd0-\xd7\xff])")
+JPEG_END, JPEG_SCAN = 0xD9, 0xDA
+# Bytes FF before a marker fill up, as many as there are.
+NOT_FILLED = re.compile(rb"[^\xff]")
 PNG_START = b"\x89PNG\r\n\x1a\n"
 # ISO/IEC 14496-12, the brand of the box `ftyp`.
 BRANDS = {
@@ -53,3 +62,35 @@ def jpeg_begins_at(data: bytes) -> int:
     if data[position : position + 3] != JPEG_START:
         return 0
     return position + 2 if data[position + 2 : position + 4] == JPEG_BEGIN else position
+
+
+def jpeg_segments(data: bytes, begin: int) -> Iterator[tuple[int, int]]:
+    """Yield position and code of each marker of the JPEG that begins at `begin`, up to its end or that of the data.
+
+    It ends at end-of-image after a scan. Raises `ValueError` where there is no marker but must be one (T.81, annex B).
+    """
+    position, scanned = begin + 2, False
+    while position + 2 <= len(data):
+        if data[position] != 0xFF:
+            raise ValueError("no marker where one must be")
+        marker = data[position + 1]
+        if marker == 0xFF:
+            filled = NOT_FILLED.search(data, position)
+            if filled is None:
+                return
+            position = filled.start() - 1
+            continue
+        yield position, marker
+        if marker == JPEG_END:
+            if not scanned:
+                raise ValueError("no picture")
+            return
+        if position + 4 > len(data):
+            return
+        position += 2 + struct.unpack_from(">H", data, position + 2)[0]
+        if marker == JPEG_SCAN:
+            scanned = True
+            following = JPEG_MARKER.search(data, position)
+            if following is None:
+                return
+            position = following.start()

@@ -9,6 +9,8 @@ from service.schemas.base import OPEN_WORD, Flag, Id, Integer, Number, Schema
 from service.schemas.geometry import Metres
 from service.schemas.names import LensModel
 
+# The same seed finds the same.
+Seed = Annotated[Integer, Field(ge=0, le=2**53 - 1)]
 CHARUCO_PATTERN = r"^((4X4|5X5|6X6|7X7)_(50|100|250|1000)|ARUCO_ORIGINAL|APRILTAG_(16h5|25h9|36h10|36h11))$"
 
 
@@ -41,7 +43,7 @@ class Options(Handling):
         "stored position, in any direction. `wide`: always around the stored poses, and nowhere else. `anywhere`: for "
         "every camera, first at its stored position and then elsewhere.",
     )
-    seed: Annotated[Integer, Field(ge=0, le=2**53 - 1)] | None = Field(None, description="Absent: one is chosen.")
+    seed: Seed | None = Field(None, description="Absent: one is chosen.")
     generations: Annotated[Integer, Field(ge=1, le=2000)] = Field(
         100, description="Generations of the search (G of the paper)."
     )
@@ -147,7 +149,7 @@ class FieldOptions(Handling):
 
     model_config = ConfigDict(json_schema_extra={"examples": [{"seed": 7}]})
 
-    seed: Annotated[Integer, Field(ge=0, le=2**53 - 1)] | None = Field(None, description="Absent: one is chosen.")
+    seed: Seed | None = Field(None, description="Absent: one is chosen.")
 
 
 class FindOptions(Handling):
@@ -168,4 +170,4 @@ class FindOptions(Handling):
         None,
         description="Largest distance of the cameras from their stored positions, m. Absent: they may stand anywhere.",
     )
-    seed: Annotated[Integer, Field(ge=0, le=2**53 - 1)] | None = Field(None, description="Absent: one is chosen.")
+    seed: Seed | None = Field(None, description="Absent: one is chosen.")

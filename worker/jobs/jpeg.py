@@ -8,13 +8,15 @@ too dark or too colourful, and where that begins, a step runs along the edges of
 """
 
 import re
-import struct
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 
 import cv2
 import numpy as np
 import simplejpeg
 from numpy.typing import NDArray
+
+from service.schemas.file_kinds import JPEG_SCAN, jpeg_segments
 
 Picture = NDArray[np.uint8]
 
@@ -26,7 +28,7 @@ ODDITY = re.compile(r"unknown JFIF|Unknown Adobe|ICC|Invalid SOS parameters|dete
 not. After any other message OpenCV shows only the part of the picture before the damage."""
 ZEROS = bytes(256)
 """More than the blocks that are coded at a time have in any picture (MCU: at most 10 blocks of 64 coefficients)."""
-START_OF_SCAN, HUFFMAN_TABLES = 0xDA, 0xC4
+HUFFMAN_TABLES = 0xC4
 SEQUENTIAL = (0xC0, 0xC1)
 """Markers of frames that are coded in one go; in refinements of progressive ones many zeros mean "as before"."""
 END_OF_BLOCK, FIRST_OF_STANDARD = 0, 1
@@ -73,20 +75,18 @@ def _is_zeroed(file: bytes) -> bool:
     such of one coefficient in all frequencies, which no scene has.
     """
     first_codes: dict[int, int] = {}
-    sequential, position = False, 2
-    while position + 4 <= len(file) and file[position] == 0xFF:
-        marker, length = struct.unpack_from(">xBH", file, position)
-        if marker == 0xFF:
-            position += 1
-            continue
-        part, position = file[position + 4 : position + 2 + length], position + 2 + length
-        sequential |= marker in SEQUENTIAL
-        if marker == HUFFMAN_TABLES:
-            first_codes |= dict(_first_codes(part))
-        if marker == START_OF_SCAN and len(part) > 2:
-            first = first_codes.get(0x10 | part[2] & 0x0F, FIRST_OF_STANDARD)
-            scan = file[position : file.find(END, position)].rstrip(PADDING)
-            return sequential and first != END_OF_BLOCK and ZEROS in scan
+    sequential = False
+    with suppress(ValueError):
+        for position, marker in jpeg_segments(file, 0):
+            begin = position + 4
+            end = begin - 2 + int.from_bytes(file[position + 2 : begin])
+            sequential |= marker in SEQUENTIAL
+            if marker == HUFFMAN_TABLES:
+                first_codes |= dict(_first_codes(file[begin:end]))
+            if marker == JPEG_SCAN and end - begin > 2:
+                first = first_codes.get(0x10 | file[begin + 2] & 0x0F, FIRST_OF_STANDARD)
+                scan = file[end : file.find(END, end)].rstrip(PADDING)
+                return sequential and first != END_OF_BLOCK and ZEROS in scan
     return False
 
 

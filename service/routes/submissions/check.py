@@ -13,6 +13,7 @@ from service.routes.contract.documented import FILE, form_body, needs_scope, sub
 from service.routes.contract.guarded import Guarded
 from service.routes.contract.problem_docs import OF_UPLOADS, problem_responses
 from service.routes.submissions import forms, job_submission
+from service.routes.submissions.find import MOST_CAMERAS
 from service.routes.submissions.intrinsics import printable_name
 from service.routes.submissions.job_submission import FromSender, Sender
 from service.schemas.check import CheckedFile, CheckOptions
@@ -22,8 +23,8 @@ from service.schemas.problems import Problem
 
 router = APIRouter(tags=["jobs"], route_class=Guarded)
 
-# As many as the cameras of a venue, and some for tools that write several files for each.
-MOST_CAMERAS, MOST_CALIBRATION_FILES = 32, 100
+# Some for each camera: there are tools that write several.
+MOST_CALIBRATION_FILES = 100
 UPLOAD = form_body(
     CheckOptions,
     "The calibration, each of its files a part `calibration` with its file name, and a JPEG or PNG of each camera to "

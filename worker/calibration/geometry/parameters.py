@@ -208,24 +208,25 @@ def field_parameters(pitch: Field) -> list[FieldParameter]:
 
 
 def _known(pitch: Field) -> dict[str, float]:
-    return careful_measurement(pitch) | _as_written(pitch) | dict(pitch.sigma)
+    careful = careful_measurement(pitch)
+    if pitch.sigma:
+        return careful | dict(pitch.sigma)
+    written = _as_written(pitch)
+    return {name: max(sigma, written.get(name, 0.0)) for name, sigma in careful.items()}
 
 
 def _as_written(pitch: Field) -> dict[str, float]:
-    """Return the sigma (m) of a size that each ground chooses and nobody says to have measured.
+    """Return the least sigma (m) of a size that each ground chooses and nobody says to have measured.
 
     It is as good as its digits: 105 m may be a default, 104.63 m is not. The right angles are those of a triangle of
     3, 4 and 5 m that closes to a centimetre.
     """
-    if pitch.sigma:
-        return {}
-    care = careful_measurement(pitch)
     written = {
-        f"{name}_m": max(care[f"{name}_m"], _rounding(getattr(pitch, name)))
+        f"{name}_m": _rounding(getattr(pitch, name))
         for name, extent in pitch.template.size.items()
         if name in ("length", "width") and extent.chosen
     }
-    return written | ({"skew_m": max(care["skew_m"], 0.002 * pitch.width / 2)} if written else {})
+    return written | ({"skew_m": 0.002 * pitch.width / 2} if written else {})
 
 
 def _rounding(value: float) -> float:
