@@ -64,10 +64,11 @@ def draw(scene: PictureInputs, names: Sequence[str]) -> dict[str, bytes]:
 
 
 def _stitched(scene: PictureInputs, names: Sequence[str]) -> dict[str, bytes]:
-    """Draw the stitched view by the new poses, and its seams and the view by the stored poses where wanted."""
+    """Draw what is wanted of the stitched view by the new poses, its seams, and the view by the stored poses."""
     view = chosen_view(*scene.found, ViewChoice(width=PREVIEW_WIDTH))
     standings = {"preview": scene.found, "preview_before": scene.stored}
-    wanted = {name: standing for name, standing in standings.items() if name == "preview" or name in names}
+    needed = {*names} | ({"preview"} if "seam" in names else set())
+    wanted = {name: standing for name, standing in standings.items() if name in needed}
     # Somebody may wait, and each of them keeps a core busy.
     with ThreadPoolExecutor(len(wanted)) as both:
         stitched = both.map(
@@ -75,7 +76,7 @@ def _stitched(scene: PictureInputs, names: Sequence[str]) -> dict[str, bytes]:
             wanted.values(),
         )
         drawn = dict(zip(wanted, stitched, strict=True))
-    pictures = {name: encode_jpeg(one.picture) for name, one in drawn.items()}
+    pictures = {name: encode_jpeg(one.picture) for name, one in drawn.items() if name in names}
     if "seam" in names:
         pictures["seam"] = encode_png(layers.seam_layer(drawn["preview"].owner))
     return pictures

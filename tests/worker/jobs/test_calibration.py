@@ -234,8 +234,9 @@ def test_the_outcome_is_what_was_found_with_pictures_and_provenance(venue, files
 
 @pytest.mark.usefixtures("drawn")
 def test_only_the_pictures_are_drawn_that_are_named(venue, files, means):
-    outcome = solve(venue, files, Options(seed=7), means, lambda _: None, pictures=["preview", "overlay_left"])
-    assert set(outcome.pictures) - MASKS == {"preview", "overlay_left"}
+    for names in (["preview", "overlay_left"], ["preview_before"], ["seam"]):
+        outcome = solve(venue, files, Options(seed=7), means, lambda _: None, pictures=names)
+        assert set(outcome.pictures) - MASKS == {*names}
 
 
 @pytest.mark.usefixtures("drawn")
