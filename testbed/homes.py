@@ -30,8 +30,9 @@ from testbed.parameters import try_first
 
 STARTING_S = 60
 BUCKET = "esc-tests"
-# Nothing of a test's database must survive a power cut.
-HASTY = ("fsync=off", "synchronous_commit=off", "full_page_writes=off")
+# Nothing of a test's database must survive a power cut. What is committed survives a kill of its processes, though:
+# `synchronous_commit=off` would lose that too.
+HASTY = ("fsync=off", "full_page_writes=off")
 # On a test: which home, or homes, it runs in. What it builds, it builds in the home that the fixture `home` gives.
 in_both_homes = pytest.mark.parametrize("home", ["embedded", "servers"], indirect=True)
 # For what no database, lock, clock or list decides: on servers it is tried by `make test-long` alone.
