@@ -97,7 +97,7 @@ def test_what_a_format_holds_is_read_back_to_a_billionth(form, records):
             np.testing.assert_allclose(after.pose.position, before.pose.position, rtol=0, atol=1e-9)
 
 
-@pytest.mark.parametrize(("form", "through"), permutations(WHOLE, 2))
+@pytest.mark.parametrize(("form", "through"), list(permutations(WHOLE, 2)))
 @given(cameras())
 @settings(max_examples=2, deadline=None)
 def test_a_calibration_comes_back_from_any_format_that_holds_all_of_it(form, through, records):
