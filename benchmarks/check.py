@@ -24,7 +24,6 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-import demo
 from benchmarks.fields import real
 from benchmarks.fields.cases import cases
 from benchmarks.fields.judging import share
@@ -45,7 +44,7 @@ from worker.compute_resources import ComputeResources
 from worker.jobs.check import solve
 
 THREADS = 2
-DEMO = Path(demo.__file__).parent
+DEMO = Path(__file__).parents[1] / "demo"
 
 
 @dataclass(frozen=True)
@@ -129,7 +128,7 @@ def _table(views: Sequence[View], options: argparse.Namespace, rows: Rows) -> It
         its = [
             _remembered(rows, view, way)
             for at, view in enumerate(views)
-            if view in clear and (number - at * each) % len(ways) < each
+            if view in clear and (number - at * each) % len(ways) < each and _changes(view, way)
         ]
         everything += its
         if its:
@@ -153,10 +152,19 @@ def _remembered(rows: Rows, view: View, way: str) -> dict:
     return rows.remembered({"check": view.name, "way": way}, _checked, view, way)
 
 
+def _changes(view: View, way: str) -> bool:
+    """True unless a camera has nothing that could be spoiled in a way, as one without k3, p1 and p2."""
+    return _spoiled(view, way) != view.camera
+
+
+def _spoiled(view: View, way: str) -> CheckedCamera:
+    return spoiled_ways()[way].spoil(view.camera, np.array([view.field.length_m, view.field.width_m]) / 2)
+
+
 def _checked(view: View, way: str) -> dict:
     """Return the row of a view whose camera is spoiled in a way."""
     spoiled = spoiled_ways()[way]
-    given = spoiled.spoil(view.camera, np.array([view.field.length_m, view.field.width_m]) / 2)
+    given = _spoiled(view, way)
     begin, means = time.process_time(), ComputeResources(MODEL_PATH, THREADS)
     file = CheckedFile(field=view.field, seed=0, format="opencv", cameras=[given])
     (found,) = solve(file, {given.id: [view.frame]}, means, lambda _: None).result.cameras
