@@ -115,7 +115,7 @@ def dealt(items, processes):
     for item in items:
         if item.get_closest_marker("servers"):
             on_servers.append(item)
-        elif item.get_closest_marker("first") or item.get_closest_marker("long"):
+        elif item.get_closest_marker("long"):
             longest.append(item)
         elif item.nodeid.startswith(WHOLE_SERVICE):
             waiting.append(item)
