@@ -72,6 +72,7 @@ def copied(source):
     return source
 
 
+@pytest.mark.long
 def test_the_wheel_has_every_file_that_runs_and_no_other(tmp_path):
     source = copied(tmp_path / "source")
     files = [path for package in PACKAGES for path in (source / package).rglob("*") if path.is_file()]

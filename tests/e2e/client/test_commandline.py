@@ -456,7 +456,7 @@ def test_a_data_folder_that_cannot_be_made_is_told_by_its_name(tmp_path, command
 def test_a_data_folder_without_rights_is_told_by_its_name(tmp_path):
     folder = tmp_path / "locked"
     folder.mkdir(mode=0o500)
-    command = [sys.executable, "-m", "service.cli", "serve", "--port", "0", "--data", folder]
+    command = [sys.executable, "-m", "service.cli", "key", "add", "a", "--scope", "read", "--data", folder]
     # What a thread may not do, what it starts may not do.
     with ThreadPoolExecutor(1, initializer=drop_capabilities) as thread:
         answer = thread.submit(subprocess.run, command, capture_output=True, text=True).result()
