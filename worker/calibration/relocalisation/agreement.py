@@ -73,21 +73,20 @@ def _expected_and_found(
 
 def _explained(field: FieldMap, view: LineView, cameras: Hypotheses, tolerance: float) -> Array:
     """Return, for each hypothesis, the share of the places on paint that lie on a marking, 0..1."""
-    rotations = cameras.rotations.astype(np.float32)
-    positions = cameras.positions.astype(np.float32)
+    rotations = cameras.rotations.astype(np.float32)[..., None]
+    positions = cameras.positions.astype(np.float32)[..., None]
     focal = cameras.focal_px.astype(np.float32)[:, None]
     x, y = (straightened(view.places, cameras.bends) / focal[..., None]).transpose(2, 0, 1)
-    rays = np.stack([x, y, np.ones_like(x)], axis=-1) @ rotations
-    down = rays[..., 2] < -1e-3
-    depth = np.where(down, -positions[:, None, 2] / np.where(down, rays[..., 2], -1), 0)
-    beside, on_map = field.to_paint(
-        positions[:, None, 0] + depth * rays[..., 0], positions[:, None, 1] + depth * rays[..., 1]
-    )
+    # Axis by axis: arrays (P, M) that lie side by side in memory are several times as fast as one (P, M, 3).
+    ray = [rotations[:, 0, axis] * x + rotations[:, 1, axis] * y + rotations[:, 2, axis] for axis in range(3)]
+    down = ray[2] < -1e-3
+    depth = np.where(down, -positions[:, 2] / np.where(down, ray[2], -1), 0)
+    beside, on_map = field.to_paint(positions[:, 0] + depth * ray[0], positions[:, 1] + depth * ray[1])
     # From metres on the ground to pixels: the derivative of the projection along the way to the nearest paint.
-    turned = rotations[:, None, :, 0] * beside[..., :1] + rotations[:, None, :, 1] * beside[..., 1:]
+    turned = [rotations[:, axis, 0] * beside[0] + rotations[:, axis, 1] * beside[1] for axis in range(3)]
     scale = focal / np.maximum(depth, 0.1)
-    across, down_px = turned[..., 0] - x * turned[..., 2], turned[..., 1] - y * turned[..., 2]
-    off = (scale / tolerance) ** 2 * (across * across + down_px * down_px)
+    across, along = turned[0] - x * turned[2], turned[1] - y * turned[2]
+    off = (scale / tolerance) ** 2 * (across * across + along * along)
     return np.asarray(np.where(down & on_map, np.exp(-off), 0).mean(axis=1))
 
 

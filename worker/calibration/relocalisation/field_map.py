@@ -62,7 +62,7 @@ class FieldMap:
         )
 
     def to_paint(self, x: Array, y: Array) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-        """Return the vectors (..., 2) m from the nearest paint to the cells of ground places, and True on the map."""
+        """Return the vectors (2, ...) m from the nearest paint to the cells of ground places, and True on the map."""
         rows, columns = self.nearest.shape[:2]
         left, lowest = self.origin.tolist()
         column = np.floor((x - left) / self.cell_m + 0.5)
@@ -70,14 +70,15 @@ class FieldMap:
         within = (column >= 0) & (row >= 0) & (column < columns) & (row < rows)
         column, row = (np.where(within, one, 0).astype(np.intp) for one in (column, row))
         # `take` from a flat array is ten times as fast as two indices.
-        return self.nearest.reshape(-1, 2).take(row * columns + column, axis=0), within
+        vectors = self.nearest.reshape(-1, 2).take(row * columns + column, axis=0)
+        return np.moveaxis(vectors, -1, 0), within
 
     @cached_property
     def is_symmetric(self) -> bool:
         """True if the field turned by half a turn looks the same, so that each view has a twin."""
         turned = -self.points[:, :2].astype(float)
         beside, _ = self.to_paint(turned[:, 0], turned[:, 1])
-        return bool(np.linalg.norm(beside, axis=-1).max() < 0.3)
+        return bool(np.linalg.norm(beside, axis=0).max() < 0.3)
 
 
 def _resampled(line: Marking, step: float) -> Array:

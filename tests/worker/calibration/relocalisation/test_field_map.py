@@ -25,7 +25,7 @@ LOPSIDED = Field(
 def test_every_point_lies_on_paint():
     markings = FieldMap.of(PITCH)
     beside, _ = markings.to_paint(*markings.points[:, :2].T.astype(float))
-    assert np.linalg.norm(beside, axis=1).max() < 2 * markings.cell_m
+    assert np.linalg.norm(beside, axis=0).max() < 2 * markings.cell_m
 
 
 def test_places_beside_the_field_are_as_far_from_paint_as_they_are():
