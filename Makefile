@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: setup demo test test-fast test-long generators coverage format check wheel release-dry-run docs bench bench-find bench-knocked bench-confidence bench-plan bench-check bench-real bench-cost bench-fields bench-segmentation bench-truth bench-service bench-faults bench-hostile bench-rate bench-versions bench-video bench-follow bench-live bench-learned train lock clean
+.PHONY: setup demo test test-fast test-long generators coverage format check wheel release-dry-run docs bench bench-find bench-knocked bench-confidence bench-plan bench-check bench-fccb bench-real bench-cost bench-fields bench-segmentation bench-truth bench-service bench-faults bench-hostile bench-rate bench-versions bench-video bench-follow bench-live bench-learned train lock clean
 
 # What runs, without what tests, checks and clips need on top: a third of the size. Compiled where it is first imported.
 $(VENV)/.runtime: docker/requirements.lock requirements.lock pyproject.toml
@@ -114,6 +114,11 @@ bench-plan: setup
 
 bench-check: setup
 	$(BENCH).check
+
+# The Fixed Camera Calibration Bench: benchmarks/fccb/README.md.
+bench-fccb: setup
+	$(BENCH).fccb make runs/fccb/public --seed 1
+	$(BENCH).fccb table runs/fccb/public
 
 # Needs GStreamer's RTSP server, as CONTRIBUTING.md says.
 bench-live: setup
