@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from fields.template import Template
-from testbed.parameters import try_first
 from testbed.synthetic import (
     BARREL,
     CROWNED,
@@ -205,7 +204,7 @@ def test_an_outlier_has_no_weight_and_the_rest_have_theirs():
     assert (weights[:4] > 0.9).all()
 
 
-@pytest.mark.parametrize("distortion", try_first([BARREL, ()]))
+@pytest.mark.parametrize("distortion", [BARREL, pytest.param((), marks=pytest.mark.long)])
 def test_a_lone_touchline_neither_lets_a_camera_run_away_nor_makes_it_sure(distortion):
     one = lone_line(distortion)
     refined = refine(CROWNED, [moved(one, by=(0.2, 0.0, 0.0))], observed(CROWNED, [one]), 0.5)
