@@ -56,6 +56,7 @@ PARTS = {
     "released": "fetch the whole history, which the last release is built from (git fetch --unshallow)",
     "gstreamer": "install GStreamer's RTSP server (Debian: apt-get install python3-gi gir1.2-gst-rtsp-server-1.0 "
     "gstreamer1.0-plugins-good gstreamer1.0-plugins-bad)",
+    "mosquitto": "install Mosquitto (Debian: apt-get install mosquitto)",
     "ffmpeg": "install FFmpeg (Debian: apt-get install ffmpeg)",
     "generators": "install generators of clients (make generators)",
 }
