@@ -58,6 +58,7 @@ PARTS = {
     "gstreamer1.0-plugins-good gstreamer1.0-plugins-bad)",
     "mosquitto": "install Mosquitto (Debian: apt-get install mosquitto)",
     "ffmpeg": "install FFmpeg (Debian: apt-get install ffmpeg)",
+    "helm": "install Helm's library and the schemas of Kubernetes (make charts)",
     "generators": "install generators of clients (make generators)",
 }
 
