@@ -17,6 +17,9 @@ from service.store.jobs.files import candidate_picture_name
 from worker.calibration.find_cameras import FoundCamera, FoundCameras, find_cameras
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.field import Field
+from worker.calibration.geometry.lens_models import PANORAMAS
+from worker.calibration.geometry.panorama import Panorama
+from worker.calibration.geometry.parameters import free_lens_sigma
 from worker.calibration.relocalisation.candidate import Candidate
 from worker.calibration.relocalisation.sought import (
     BENDS,
@@ -24,7 +27,9 @@ from worker.calibration.relocalisation.sought import (
     Place,
     SoughtCamera,
     SoughtLens,
+    guessed_panoramas,
     lenses_of_view,
+    panorama_of_view,
     unknown_lenses,
 )
 from worker.calibration.rendering.overlays import candidate_picture
@@ -53,9 +58,13 @@ from worker.jobs.to_schemas import (
     sigma_to_schema,
 )
 
+USUAL_PANORAMA_DEG = 155.0
+"""Field of view of a panorama of which nothing is said; with 30 % to either side, cameras of two to four lenses."""
 log = logging.getLogger(__name__)
 FIELD_OF_VIEW_UNCERTAIN = 0.15
 """One standard deviation of the focal length that a given field of view leaves, as a part of it."""
+PANORAMA_UNCERTAIN = 0.05
+"""The same of a panorama, whose data sheet gives its angle to the nearest ten degrees: what is stitched is cropped."""
 
 
 def solve(
@@ -95,8 +104,17 @@ def sought_camera(camera: SoughtCameraIn, size: tuple[int, int]) -> SoughtCamera
     position = None if camera.position is None else np.array(camera.position)
     place = Place(camera.side, position, camera.position_radius_m)
     ignored = ignored_areas_of(camera.ignore, size)
+    if camera.panorama is not None:
+        view_deg = camera.field_of_view_deg or USUAL_PANORAMA_DEG
+        uncertain = FIELD_OF_VIEW_UNCERTAIN if camera.field_of_view_deg is None else PANORAMA_UNCERTAIN
+        lens = panorama_of_view(size, PANORAMAS[camera.panorama], view_deg)
+        return SoughtCamera(camera.id, guessed_panoramas(lens, uncertain), place, ignored)
     if camera.intrinsics is not None:
         lens = lens_of(camera.intrinsics, list(size))
+        if isinstance(lens, Panorama):
+            sigma = free_lens_sigma(lens) | dict(lens.sigma)
+            guessed = guessed_panoramas(lens, sigma["fx"] / lens.focal_length_px)
+            return SoughtCamera(camera.id, guessed, place, ignored)
         known = SoughtLens.around(lens, lens.sigma.get("fx", 0.0) / lens.focal_length_px)
         return SoughtCamera(camera.id, [known], place, ignored)
     if camera.field_of_view_deg is not None:
