@@ -114,6 +114,7 @@ def _sought(camera: Camera, options: FindOptions) -> SoughtCameraIn:
         id=camera.id,
         image_size=camera.image_size,
         intrinsics=None if options.find_lens else camera.intrinsics,
+        panorama=camera.intrinsics.panorama if options.find_lens else None,
         ignore=camera.ignore,
     )
     if options.position_radius_m is None:

@@ -11,7 +11,7 @@ from pydantic import BaseModel, Field, model_validator
 
 from service.schemas.base import OPEN_WORD, Id, Integer, Number, Schema
 from service.schemas.lens_limits import LARGEST_COEFFICIENT, LARGEST_SIGMA, LEAST_SIGMA
-from service.schemas.names import OPTIONS_PART, PANORAMAS, LensModel, SigmaSource
+from service.schemas.names import OPTIONS_PART, PANORAMAS, LensModel, Panorama, SigmaSource
 from service.schemas.rotation import rotate
 
 DISTORTION_LENGTHS: dict[LensModel, tuple[int, ...]] = {
@@ -139,7 +139,7 @@ class Intrinsics(Schema):
             *most, last_length = DISTORTION_LENGTHS[self.model]
             expected = f"{', '.join(map(str, most))} or {last_length}" if most else last_length
             raise ValueError(f"distortion must have {expected} numbers with the model {self.model}")
-        if self.is_panorama and self.matrix[0][1] != 0:
+        if self.panorama and self.matrix[0][1] != 0:
             raise ValueError(f"skew must be 0 with the model {self.model}, came {self.matrix[0][1]:g}")
         return self
 
@@ -154,9 +154,9 @@ class Intrinsics(Schema):
         return self
 
     @property
-    def is_panorama(self) -> bool:
-        """True for the lens of a picture that was stitched onto a cylinder or a sphere."""
-        return self.model in PANORAMAS
+    def panorama(self) -> Panorama | None:
+        """Model of the lens of a picture that was stitched onto a cylinder or a sphere; None for other lenses."""
+        return next((model for model in PANORAMAS if model == self.model), None)
 
     @property
     def without_sigma(self) -> "Intrinsics":
