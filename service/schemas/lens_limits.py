@@ -17,8 +17,8 @@ def assumed_lens_warning(camera: str, *, is_panorama: bool = False) -> str:
     """Return the warning about a camera whose lens has no sigma: what is assumed in its place."""
     if is_panorama:
         return (
-            f"camera {camera}: its panorama has no sigma, and its focal length, horizon and vertical scale are taken to "
-            f"be known to {PANORAMA_FOCAL_PERCENT} % of the focal length; a search finds them better"
+            f"camera {camera}: its panorama has no sigma, and focal length, horizon and vertical scale are taken to be "
+            f"known to {PANORAMA_FOCAL_PERCENT} % of the focal length; a search finds them better"
         )
     return (
         f"camera {camera}: its lens has no sigma and is taken to be as sure as a good board leaves it, "
