@@ -55,7 +55,7 @@ def camera(matrix, distortion, size, model="opencv", sigma=True):
         (camera(matrix(800, 959.5, 539.5), [-0.02, 0, 0, 0], HD, "fisheye"), []),
         (camera(matrix(1500, 959.5, 539.5), TILTED, HD), []),
         (camera(matrix(611, 959.5, 20.5, 650), [], HD, "cylindrical"), []),
-        (camera(matrix(611, 959.5, 20.5), [], HD, "cylindrical", sigma=None), ["taken to be known to 3 % of the focal"]),
+        (camera(matrix(611, 959.5, 20.5), [], HD, "cylindrical", sigma=None), ["known to 3 % of the focal"]),
         (camera(matrix(250, 959.5, 539.5), [], HD, "equirectangular"), [r"no ray for 42 % of the picture"]),
         (camera(matrix(20000, 959.5, 539.5), [0.2, -7, 0, 0, -1450], HD), []),
         # Anamorphic within what a fit leaves, and a lens that was shifted.
