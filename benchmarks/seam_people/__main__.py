@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import cv2
@@ -21,6 +22,7 @@ from benchmarks.seam_people.methods import Method, methods, shown_by
 from benchmarks.seam_people.scores import Lines, Score, truths
 from worker.calibration.geometry.camera import Array, Frame
 from worker.calibration.stitching.panorama import Panorama, panorama
+from worker.calibration.stitching.people_seam import shows_pitch
 from worker.calibration.stitching.photometric_alignment import evened_out
 from worker.calibration.stitching.views import StitchedView, ViewChoice, chosen_view
 
@@ -49,13 +51,14 @@ def main() -> int:
 def _of_rig(rig: Rig, asked: argparse.Namespace) -> dict[str, float]:
     stored = calibrated(rig.cameras(), SEED)
     view = chosen_view(FIELD, stored, ViewChoice(width=WIDTH))
-    bare = panorama(FIELD, view, stored)
-    clip = _Clip(rig, seam_points(view, bare), asked.seconds, asked.clips)
-    first = clip.frames(0)
-    made = panorama(FIELD, view, stored, evened_out(FIELD, stored, first))
+    clip = _Clip(rig, asked.seconds, asked.clips)
+    made = panorama(FIELD, view, stored, evened_out(FIELD, stored, clip.empty_frames()))
+    clip.game.start(seam_points(view, made), asked.seconds)
     lines = Lines(made, view, stored, rig.cameras())
     compared = [
-        one for one in methods(made, on_pitch(view)) if not asked.methods or any(map(one.name.startswith, asked.methods))
+        one
+        for one in methods(made, shows_pitch(FIELD, view))
+        if not asked.methods or any(map(one.name.startswith, asked.methods))
     ]
     scores = {one.name: Score() for one in compared}
     sheets: dict[str, list[Frame]] = {one.name: [] for one in compared}
@@ -76,36 +79,39 @@ def _of_rig(rig: Rig, asked: argparse.Namespace) -> dict[str, float]:
 class _Clip:
     """The frames of a game, rendered, or as an earlier run kept them."""
 
-    def __init__(self, rig: Rig, seams: Array, seconds: float, folder: Path | None) -> None:
+    def __init__(self, rig: Rig, seconds: float, folder: Path | None) -> None:
         self._folder = None if folder is None else folder / f"{rig.name} {seconds:g} s"
-        self.game = Game(rig, seams, seconds, SEED)
+        self.game = Game(rig, SEED)
+
+    def empty_frames(self) -> dict[str, Frame]:
+        """Return a frame of each camera without anybody in it."""
+        return self._kept("empty", self.game.empty_frames)
 
     def frames(self, number: int) -> dict[str, Frame]:
         """Return the frame of each camera at a moment."""
+        return self._kept(f"{number:04d}", lambda: self.game.frames(number))
+
+    def _kept(self, name: str, render: Callable[[], dict[str, Frame]]) -> dict[str, Frame]:
         if self._folder is None:
-            return self.game.frames(number)
+            return render()
         self._folder.mkdir(parents=True, exist_ok=True)
-        files = {camera.id: self._folder / f"{number:04d} {camera.id}.jpg" for camera in self.game.cameras}
+        files = {camera.id: self._folder / f"{name} {camera.id}.jpg" for camera in self.game.cameras}
         if not all(file.exists() for file in files.values()):
-            for camera, frame in self.game.frames(number).items():
+            for camera, frame in render().items():
                 cv2.imwrite(str(files[camera]), frame, [cv2.IMWRITE_JPEG_QUALITY, 95])
         return {camera: np.asarray(cv2.imread(str(file)), np.uint8) for camera, file in files.items()}
 
 
 def seam_points(view: StitchedView, made: Panorama) -> Array:
     """Return points (N, 2) of the field on the static seams."""
-    owner = made.owner
-    edge = (owner[:, 1:] != owner[:, :-1]) & (owner[:, 1:] >= 0) & (owner[:, :-1] >= 0)
-    rows, columns = np.nonzero(edge)
+    rows, columns = np.nonzero(_seam_mask(made))
     ground = view.behind(FIELD, np.stack([columns, rows], axis=-1)[None].astype(float))[0, :, :2]
     return ground[(np.abs(ground) < [FIELD.length / 2, FIELD.width / 2]).all(axis=1)]
 
 
-def on_pitch(view: StitchedView) -> NDArray[np.bool_]:
-    """Return which pixels (H, W) show the field."""
-    width, height = view.size
-    ground = view.behind(FIELD, np.stack(np.meshgrid(np.arange(width), np.arange(height)), axis=-1).astype(float))
-    return (np.abs(ground[..., :2]) < [FIELD.length / 2 + 2, FIELD.width / 2 + 2]).all(axis=-1)
+def _seam_mask(made: Panorama) -> NDArray[np.bool_]:
+    owner = made.owner
+    return (owner[:, 1:] != owner[:, :-1]) & (owner[:, 1:] >= 0) & (owner[:, :-1] >= 0)
 
 
 def _crossings(game: Game, view: StitchedView, made: Panorama, count: int) -> int:
@@ -153,8 +159,9 @@ def _drawn(made: Panorama, shown: list[NDArray[np.float32]], weights: list[NDArr
     edge[:, 1:] = best[:, 1:] != best[:, :-1]
     edge[1:] |= (best[1:] != best[:-1]).astype(np.uint8)
     picture[edge > 0] = (0, 0, 255)
-    columns = np.flatnonzero((made.owner[:, 1:] != made.owner[:, :-1]).any(axis=0))
-    middle = int(np.median(columns)) if made.owner.max() < 2 else int(columns[len(columns) // 4])
+    columns = np.flatnonzero(_seam_mask(made).any(axis=0))
+    # One of the seams, where there are several.
+    middle = int(columns[len(columns) // (2 if len(made.parts) == 2 else 5)])
     return picture[:, max(middle - 200, 0) : middle + 200]
 
 

@@ -1,4 +1,4 @@
-"""Rendered clips of a game: cameras, people and a ball that cross the seams, and where each camera shows each of them."""
+"""Rendered clips of a game: cameras, people and a ball that cross the seams, and where each camera shows them."""
 
 from __future__ import annotations
 
@@ -88,25 +88,33 @@ class Runner:
 
 
 class Game:
-    """A clip of a rig: `runners`, a ball that is kicked over the seams, and the backgrounds of the cameras."""
+    """A clip of a rig: people who run, a ball that is kicked over the seams, and the backgrounds of the cameras."""
 
-    def __init__(self, rig: Rig, seams: Array, seconds: float, seed: int) -> None:
-        self.rig, self.seconds = rig, seconds
+    def __init__(self, rig: Rig, seed: int) -> None:
+        self.rig = rig
         self.cameras = rig.cameras()
+        self.runners: list[Runner] = []
         light = "floodlight" if rig.night else "sun"
         self._conditions = replace(Conditions.fair(WORLD), players=0, noise=0.0, wear=0.04, light=light)
         self._world: World = build_world(FIELD, self._conditions)
-        rng = np.random.default_rng(seed)
-        self.runners = list(_runners(self._world, seams, seconds, rng))
-        self._kick = seams[rng.integers(len(seams))] - [12.0, 2.0]
-        self._gains = np.exp(rng.normal(0, EXPOSURE, len(self.cameras)))
+        self._rng = np.random.default_rng(seed)
+        self._gains = np.exp(self._rng.normal(0, EXPOSURE, len(self.cameras)))
         sigma = NIGHT_NOISE if rig.night else NOISE
-        self._noise = rng.normal(0, sigma, (SIZE[1] + 64, SIZE[0] + 64, 1)).astype(np.float32).repeat(3, axis=2)
+        self._noise = self._rng.normal(0, sigma, (SIZE[1] + 64, SIZE[0] + 64, 1)).astype(np.float32).repeat(3, axis=2)
+
+    def start(self, seams: Array, seconds: float) -> None:
+        """Let people run for some seconds, most of them across points (N, 2) of the seams."""
+        self.runners = list(_runners(self._world, seams, seconds, self._rng))
+        self._kick = seams[self._rng.integers(len(seams))] - [12.0, 2.0]
 
     @cached_property
     def _grounds(self) -> list[Frame]:
         rng = np.random.default_rng(0)
         return [render_frame(FIELD, camera, self._conditions, rng).frame for camera in self.cameras]
+
+    def empty_frames(self) -> dict[str, Frame]:
+        """Return a frame of each camera before anybody has come."""
+        return {camera.id: self._exposed(index, 0, self._grounds[index]) for index, camera in enumerate(self.cameras)}
 
     def frames(self, number: int) -> dict[str, Frame]:
         """Return the frame of each camera at the `number`th moment."""
@@ -133,6 +141,9 @@ class Game:
         for person in sorted(seen, key=lambda one: -float(np.linalg.norm(one.foot - centre))):
             person.draw(canvas)
         canvas.disc(self.ball(number), BALL_M, np.float32([0.95, 0.95, 0.95]))
+        return self._exposed(index, number, colour)
+
+    def _exposed(self, index: int, number: int, colour: Frame) -> Frame:
         across, down = np.random.default_rng([index, number]).integers(0, 64, 2)
         noise = self._noise[down : down + SIZE[1], across : across + SIZE[0]]
         lit = cv2.addWeighted(colour, float(self._gains[index]), noise, 1.0, 0.0, dtype=cv2.CV_8U)
@@ -145,9 +156,7 @@ def calibrated(cameras: Sequence[Camera], seed: int) -> list[Camera]:
     return [
         camera.with_pose(
             Pose(
-                rotation_vectors(
-                    rotation_matrices(np.radians(rng.normal(0, POSE_SIGMA_DEG, 3))) @ camera.pose.matrix
-                ),
+                rotation_vectors(rotation_matrices(np.radians(rng.normal(0, POSE_SIGMA_DEG, 3))) @ camera.pose.matrix),
                 camera.pose.position,
             )
         )
@@ -168,7 +177,7 @@ def outlines(thing: Person | Array, centre: Array) -> list[Array]:
 def silhouettes(
     view: LevelView, thing: Person | Array, cameras: Sequence[Camera]
 ) -> tuple[tuple[slice, slice], list[NDArray[np.bool_]]]:
-    """Return rows and columns of the view around a person or a ball, and where (h, w) each camera's picture shows it."""
+    """Return rows and columns of the view around a person or a ball, and where (h, w) each camera shows it."""
     pixels = [
         [view.project(_onto_ground(polygon, camera.pose.position)) for polygon in outlines(thing, camera.pose.position)]
         for camera in cameras
@@ -221,5 +230,3 @@ def _person(world: World, number: int, rng: np.random.Generator) -> Person:
     skin = hsv(rng.uniform(10, 30), rng.uniform(0.3, 0.6), rng.uniform(0.25, 0.85))
     kit = (shirt, shorts, socks, skin, 0.72 * shirt, hsv(25, 0.5, rng.uniform(0.03, 0.35)))
     return Person(np.zeros(3), float(rng.uniform(1.6, 1.95)), kit, 0.0, float(rng.normal(0, 0.05)), None)
-
-

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from benchmarks.seam_people.game import RATE
 from worker.calibration.geometry.camera import Frame, inside
 from worker.calibration.stitching.panorama import Panorama
-from worker.calibration.stitching.people_seam import seam_bands, shares
+from worker.calibration.stitching.people_seam import blend_shares, seam_bands
 
 Weights = Sequence[NDArray[np.float32]]
 # OpenCV's finders run on pictures half as large: its own sample stitches take a tenth of a megapixel.
@@ -76,7 +76,7 @@ class _People:
                 for number in band.cameras
             )
             i, j = band.cameras
-            weights[j][rows, columns] = shares(band, *band.update(first, second), weights[j][rows, columns])
+            weights[j][rows, columns] = blend_shares(*band.update(first, second), weights[j][rows, columns])
             total = self._made.parts[i].weight[rows, columns] + self._made.parts[j].weight[rows, columns]
             weights[i][rows, columns] = total - weights[j][rows, columns]
         return weights

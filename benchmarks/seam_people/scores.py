@@ -44,7 +44,9 @@ class Score:
     _before: Weights | None = None
     _shown_by: dict[int, int] = field(default_factory=dict)
 
-    def add(self, truths: dict[int, Truth], weights: Weights, shown: Sequence[NDArray[np.float32]], lines: Lines) -> None:
+    def add(
+        self, truths: dict[int, Truth], weights: Weights, shown: Sequence[NDArray[np.float32]], lines: Lines
+    ) -> None:
         """Take the weights of a moment."""
         busy = np.zeros(weights[0].shape, bool)
         for number, truth in truths.items():
@@ -98,7 +100,10 @@ class Lines:
         self.group = self.group[within][both]
         place = points.position[within][both]
         self._errors = np.stack(
-            [_shifted(view, camera, other, place) - view.project(place) for camera, other in zip(stored, true, strict=True)]
+            [
+                _shifted(view, camera, other, place) - view.project(place)
+                for camera, other in zip(stored, true, strict=True)
+            ]
         )
 
     def offsets(self, weights: Weights) -> Array:

@@ -16,8 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from worker.calibration.geometry.camera import inside
+from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.ground_view import box
-from worker.calibration.stitching.panorama import Panorama
+from worker.calibration.stitching.panorama import Panorama, every_nth_pixel, every_pixel
+from worker.calibration.stitching.views import StitchedView
 
 Mask = NDArray[np.uint8]
 Values = NDArray[np.float32]
@@ -26,16 +28,17 @@ Values = NDArray[np.float32]
 CELL_PX, CELL_COLUMNS = 2, 1920
 # How far from a seam people are looked for, in widths of the view: a near player with arms stretched.
 REACH = 0.1
-# What is so near to the border of a frame, in its widths, comes and goes with shaking, and is blurred.
-FRAME_BORDER = 0.02
+# What is so near to the border of a frame, in its widths, is half outside of it.
+FRAME_BORDER = 0.002
 # Cells over which one camera passes into the other beside people, and those beyond the seam from which on they change.
 MARGIN, CLEAR = 3, 8
-# A difference is of people from so many mean differences on, and at least the sum of a few levels of each colour.
-MEANS, LEAST_LEVELS = 4.0, 18.0
-SPECK_CELLS = 4
+# Differences that are of people, in mean differences, and at least: the sum of three colours' levels. Faint ones count
+# where they hang together with more outright ones than noise makes.
+FAINT, OUTRIGHT, SPECK_CELLS = (3.0, 6.0), (6.0, 12.0), 2
+BESIDE = np.ones((3, 3), np.uint8)
 # Seconds in which what stays becomes a part of the ground: where nobody is, and where somebody stands.
 GROUND_S, STANDING_S = 1.0, 240.0
-# More of a band than this does not differ because of people, but because a light went on.
+# More of a band than this does not differ because of people: a light went on, or a camera changed its exposure.
 CROWD = 0.6
 
 
@@ -83,29 +86,36 @@ class SeamBand:
         """
         difference = np.asarray(cv2.blur(first - second, (3, 3)), np.float32)
         if self._ground is None:
-            # Beyond the field stands what stays.
-            self._ground = difference * (1 - self.pitch)[..., None]
-            apart = self._apart(difference)
-            typical = float(np.median(apart[(self.zone & self.pitch) > 0])) if (self.zone & self.pitch).any() else 0.0
-            self._noise = np.full(self.zone.shape, typical, np.float32)
+            self._begin(difference)
         apart = self._apart(difference)
-        differing = ((apart > np.maximum(MEANS * self._noise, LEAST_LEVELS)) & (self.zone > 0)).astype(np.uint8)
-        if np.count_nonzero(differing) > CROWD * np.count_nonzero(self.zone):
-            self._ground, differing = difference, np.zeros_like(differing)
-        hulls = _hulls(differing) & self.zone
-        self._learn(difference, apart, hulls)
+        faint, outright = (
+            ((apart > np.maximum(means * self._noise, levels)) & (self.zone > 0)).astype(np.uint8)
+            for means, levels in (FAINT, OUTRIGHT)
+        )
+        if np.count_nonzero(faint) > CROWD * np.count_nonzero(self.zone):
+            self._ground, faint = difference, np.zeros_like(faint)
+        hulls = _hulls(faint, outright) & self.zone
+        self._learn(difference, apart, faint | hulls)
         self._labels, self._hulls = self._labelled(hulls), hulls
         return self._blended(hulls, self._labels)
+
+    def _begin(self, difference: Values) -> None:
+        """Take what stands beyond the field as ground; people on the field are there from the first moment on."""
+        on_pitch = (self.zone & self.pitch) > 0
+        usual = np.median(difference[on_pitch], axis=0) if on_pitch.any() else 0.0
+        self._ground = np.where(self.pitch[..., None] > 0, np.float32(usual), difference)
+        apart = self._apart(difference)
+        self._noise = np.full(self.zone.shape, np.median(apart[on_pitch]) if on_pitch.any() else 0.0, np.float32)
 
     def _apart(self, difference: Values) -> Values:
         return np.asarray(cv2.transform(cv2.absdiff(difference, self._ground), np.ones((1, 3))), np.float32)
 
-    def _learn(self, difference: Values, apart: Values, hulls: Mask) -> None:
-        """Follow the ground, hardly where people are."""
-        share = np.where(hulls > 0, np.float32(1 / STANDING_S), np.float32(1 / GROUND_S)) / np.float32(self.rate)
+    def _learn(self, difference: Values, apart: Values, taken: Mask) -> None:
+        """Follow the ground, hardly where it is taken."""
+        share = np.where(taken > 0, np.float32(1 / STANDING_S), np.float32(1 / GROUND_S)) / np.float32(self.rate)
         assert self._ground is not None
         self._ground += share[..., None] * (difference - self._ground)
-        self._noise += np.where(hulls > 0, np.float32(0), share) * (apart - self._noise)
+        self._noise += np.where(taken > 0, np.float32(0), share) * (apart - self._noise)
 
     def _labelled(self, hulls: Mask) -> Mask:
         """Return the labels (h, w): 1 for the second camera, by the memory and by where each hull lies."""
@@ -133,19 +143,29 @@ class SeamBand:
     def _blended(self, hulls: Mask, labels: Mask) -> tuple[Values, Values]:
         size = 2 * (2 * MARGIN + 1,)
         people, second = (cv2.blur(mask.astype(np.float32), size) for mask in (hulls, hulls & labels))
-        around = np.minimum(np.asarray(people) * 2, 1).astype(np.float32) * self.zone
+        around = np.minimum(np.asarray(people) * 4, 1).astype(np.float32) * self.zone
         return around, np.asarray(second / np.maximum(people, np.float32(1e-6)), np.float32)
 
 
-def seam_bands(made: Panorama, pitch: NDArray[np.bool_], rate: float) -> list[SeamBand]:
-    """Return the bands of the seams of a panorama; `pitch` (H, W): where its pixels show the field."""
+def shows_pitch(pitch: Field, view: StitchedView) -> NDArray[np.bool_]:
+    """Return which pixels (H, W) of a view show the field."""
+    ground = np.abs(view.behind(pitch, every_nth_pixel(view.size))[..., :2])
+    on_pitch = (ground < [pitch.length / 2, pitch.width / 2]).all(axis=-1)
+    return every_pixel(on_pitch, view.size) > 0.5
+
+
+def seam_bands(made: Panorama, pitch: NDArray[np.bool_], rate: float, border: float = FRAME_BORDER) -> list[SeamBand]:
+    """Return the bands of the seams of a panorama.
+
+    `pitch` (H, W): where its pixels show the field; `rate`: of moments, a second; `border`: of each frame, in its
+    widths, that is not used.
+    """
     cell = CELL_PX * max(1, round(made.size[0] / CELL_COLUMNS))
     rows, columns = (extent // cell for extent in reversed(made.size))
     cells = slice(0, cell * rows, cell), slice(0, cell * columns, cell)
     owner, reach = made.owner[cells], REACH * made.size[0] / cell
     seen = [
-        inside(part.source[cells], part.frame_size, FRAME_BORDER * part.frame_size[0])
-        | (part.weight[cells] > 0.99)
+        inside(part.source[cells], part.frame_size, border * part.frame_size[0]) | (part.weight[cells] > 0.99)
         for part in made.parts
     ]
     pairs = [pair for pair in combinations(range(len(made.parts)), 2) if _seam(owner, pair).any()]
@@ -190,19 +210,21 @@ def _with_border(zone: NDArray[np.bool_]) -> tuple[tuple[int, int], tuple[int, i
     )
 
 
-def _hulls(differing: Mask) -> Mask:
-    """Return the convex hulls (h, w) of what differs, each of what hangs together."""
-    closed = np.asarray(cv2.morphologyEx(differing, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8)))
-    outlines, _ = cv2.findContours(closed, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
-    hulls = np.zeros_like(closed)
+def _hulls(faint: Mask, outright: Mask) -> Mask:
+    """Return the convex hulls (h, w) of what differs and its blurred border, each of what hangs together."""
+    grown = cv2.morphologyEx(cv2.dilate(faint, BESIDE), cv2.MORPH_CLOSE, BESIDE)
+    _, numbers = cv2.connectedComponents(grown, connectivity=4)
+    people = np.bincount(numbers[outright > 0], minlength=int(numbers.max()) + 1) > SPECK_CELLS
+    people[0] = False
+    outlines, _ = cv2.findContours(people[numbers].astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
+    hulls = np.zeros_like(faint)
     for outline in outlines:
-        if cv2.contourArea(outline) >= SPECK_CELLS:
-            cv2.fillConvexPoly(hulls, cv2.convexHull(outline), 1)
-    return np.asarray(cv2.dilate(hulls, np.ones((3, 3), np.uint8)), np.uint8)
+        cv2.fillConvexPoly(hulls, cv2.convexHull(outline), 1)
+    return hulls
 
 
-def shares(band: SeamBand, people: Values, second: Values, static: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return how much the second camera counts in the band's pixels (H, W), by `SeamBand.update`; else as `static`."""
+def blend_shares(people: Values, second: Values, static: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return how much the second camera counts in a band's pixels (H, W), by `SeamBand.update`; else as `static`."""
     size = static.shape[1], static.shape[0]
     fine, labels = (cv2.resize(part, size, interpolation=cv2.INTER_LINEAR) for part in (people, second))
     return np.asarray(cv2.blendLinear(labels, static, fine, 1 - fine), np.float32)
