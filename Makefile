@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: setup demo test test-fast test-long generators charts coverage format check wheel release-dry-run docs bench bench-find bench-knocked bench-confidence bench-plan bench-check bench-fccb bench-real bench-cost bench-fields bench-segmentation bench-truth bench-service bench-faults bench-hostile bench-rate bench-versions bench-video bench-follow bench-live bench-learned train lock clean
+.PHONY: setup demo test test-fast test-long generators charts coverage format check wheel release-dry-run docs bench bench-find bench-knocked bench-confidence bench-plan bench-check bench-fccb bench-real bench-cost bench-fields bench-segmentation bench-truth bench-service bench-faults bench-hostile bench-rate bench-versions bench-video bench-follow bench-live bench-seam-people bench-learned train lock clean
 
 # What runs, without what tests, checks and clips need on top: a third of the size. Compiled where it is first imported.
 $(VENV)/.runtime: docker/requirements.lock requirements.lock pyproject.toml
@@ -177,6 +177,9 @@ bench-follow: setup
 	$(BENCH).shaking --lens usual
 	$(BENCH).shaking --size 4k --seconds 4
 	$(BENCH).tracking_cost $(if $(BEFORE),--before $(BEFORE))
+
+bench-seam-people: setup
+	$(BENCH).seam_people
 
 bench-video: setup
 	$(BIN)/python -m benchmarks.stitch_video
