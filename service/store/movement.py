@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from fields.shapes import Arc, Line, Shape, Spot
 from service.schemas.field import FieldOfPlay
-from service.schemas.geometry import Moved, PosedCamera
-from service.schemas.names import LensModel
+from service.schemas.geometry import Intrinsics, Moved, PosedCamera
+from service.schemas.names import PANORAMAS, LensModel
 
 Array = NDArray[np.float64]
 # The points on all markings together; rounding adds at most one for each marking.
@@ -145,6 +145,8 @@ def pixels(camera: PosedCamera, points: Array) -> Array:
 
 def _seen(camera: PosedCamera, seen_from_camera: Array) -> Array:
     """Project points (N, 3) in the camera's frame (N, 2); NaN behind the camera and beyond the lens model."""
+    if camera.intrinsics.model in PANORAMAS:
+        return _onto_panorama(camera.intrinsics, seen_from_camera)
     across, depth = np.hypot(*seen_from_camera.T[:2]), seen_from_camera[:, 2]
     lens = camera.intrinsics
     distortion = np.array(lens.distortion or [0.0] * 4)
@@ -154,6 +156,16 @@ def _seen(camera: PosedCamera, seen_from_camera: Array) -> Array:
         matrix = np.array(lens.matrix)
         places[held] = _distorted(lens.model, distortion, seen_from_camera[held]) @ matrix[:2, :2].T + matrix[:2, 2]
     return places
+
+
+def _onto_panorama(lens: Intrinsics, seen_from_camera: Array) -> Array:
+    """Project points (N, 3) in the camera's frame to a panorama (N, 2); NaN on its axis."""
+    right, down, ahead = seen_from_camera.T
+    away = np.hypot(right, ahead)
+    slope = down / np.where(away > 0, away, np.nan)
+    height = slope if lens.model == "cylindrical" else np.arctan(slope)
+    matrix = np.array(lens.matrix)
+    return np.asarray(np.column_stack([np.arctan2(right, ahead), height]) @ matrix[:2, :2].T + matrix[:2, 2])
 
 
 def _turning_back(model: LensModel, distortion: Array) -> float:

@@ -239,6 +239,7 @@ def test_a_search_is_followed_to_its_end(stub, visit, name):
     expect(page.get_by_role("button", name="Create the venue")).to_be_enabled()
 
 
+@pytest.mark.long
 def test_everybody_can_use_the_pages_on_which_cameras_are_found_on_a_phone_too(stub, visit, name, files):
     job = found(stub, name, place=site(name, "partly"))
     page = visit(stub.url, "/ui/new-venue")

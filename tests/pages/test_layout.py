@@ -26,6 +26,7 @@ def inside(page, part):
     return box["x"] >= 0 and box["x"] + box["width"] <= PHONE["width"]
 
 
+@pytest.mark.long
 def test_a_phone_shows_all_of_each_row_with_what_it_is(stored, phone):
     name = "small"
     job = stored.calibrated(name)

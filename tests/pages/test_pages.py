@@ -297,7 +297,7 @@ PAGES = {
 }
 
 
-@pytest.mark.parametrize("name", try_first(PAGES, 3))
+@pytest.mark.parametrize("name", try_first(PAGES))
 def test_nothing_serious_keeps_anybody_from_using_a_page_and_it_fits_a_phone(stub, years, ended, one_tab, name):
     stub.venue("bare")
     one_tab.set_viewport_size(DESK)

@@ -79,7 +79,7 @@ def _given(camera: CheckedCamera, size: tuple[int, int]) -> GivenCamera:
 
 def _reordered(lens: Lens) -> Lens | None:
     """Return a lens whose five coefficients are read as k1, k2, k3, p1, p2; None where that changes nothing."""
-    if lens.model == "fisheye" or len(lens.distortion) != 5 or np.ptp(lens.distortion[2:]) == 0:
+    if lens.model != "opencv" or len(lens.distortion) != 5 or np.ptp(lens.distortion[2:]) == 0:
         return None
     return replace(lens, distortion=lens.distortion[[0, 1, 3, 4, 2]])
 

@@ -137,6 +137,7 @@ def python(program, **environment):
     )
 
 
+@pytest.mark.long
 def test_without_an_endpoint_nothing_that_sends_is_loaded():
     light = python(LIGHT)
     assert light.returncode == 0, light.stderr

@@ -233,6 +233,7 @@ def test_esc_says_which_cameras_had_their_points_exchanged(tmp_path):
     assert not (tmp_path / "v.json").exists()
 
 
+@pytest.mark.long
 def test_esc_hints_at_points_of_one_camera_that_were_given_for_two(tmp_path):
     """With the lens fitted to them, the points of another camera fit; the focal length is the other one's."""
     longer = replace(LENS, matrix=LENS.matrix * [[1.08, 1, 1], [1, 1.08, 1], [1, 1, 1]])

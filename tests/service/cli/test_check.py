@@ -61,6 +61,7 @@ def run(tmp_path, frames, cameras, form, capsys, **options):
     return ended.value.exit_code, json.loads(printed.out), printed.err
 
 
+@pytest.mark.long
 def test_true_cameras_are_good(tmp_path, frames, capsys):
     code, answer, _ = run(tmp_path, frames, records(), "colmap", capsys)
     assert (code, answer["grade"], answer["format"]) == (0, "good", "colmap")

@@ -20,7 +20,7 @@ from service.formats.rotations import matrix_of, vector_of
 from service.formats.table import FILE_FORMATS
 from service.schemas.geometry import Intrinsics, LensFile, Pose
 from service.schemas.problems import Problem
-from worker.calibration.geometry.lens import LENSES
+from worker.calibration.geometry.lens_models import LENSES
 
 WITH_FISHEYE = ("json", "opencv", "colmap", "caliscope", "kalibr", "ros", "nerf")
 WITHOUT_POSE = ("ros",)

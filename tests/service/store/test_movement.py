@@ -1,11 +1,14 @@
 """What the service says a camera moved, against the engine."""
 
+from typing import get_args
+
 import cv2
 import numpy as np
 import pytest
 
 from service.schemas.field import FieldOfPlay
 from service.schemas.geometry import Intrinsics, Pose, PosedCamera
+from service.schemas.names import PANORAMAS, LensModel
 from service.store import movement
 from worker.calibration.gate.quality import Moved
 from worker.jobs.from_schemas import camera_of, pitch_of
@@ -19,6 +22,8 @@ LENSES = {
     "thin prism": [-0.2, 0.05, 0.001, 0.001, 0, 0, 0, 0, 0.004, -0.002, 0.003, 0.001],
     "tilted": [-0.2, 0.05, 0.001, 0.001, 0, 0, 0, 0, 0, 0, 0, 0, 0.03, -0.02],
     "fisheye": [0.02, -0.003, 0.001, -0.0002],
+    "cylindrical": [],
+    "equirectangular": [],
 }
 
 
@@ -28,8 +33,8 @@ def camera(lens="barrel", turned=(0, 0, 0), by=(0, 0, 0), skew=0.0) -> PosedCame
         id="left",
         image_size=[3072, 1728],
         intrinsics=Intrinsics(
-            model="fisheye" if lens == "fisheye" else "opencv",
-            matrix=[[2122.4, skew, 1634.8], [0, 2122.4, 877.7], [0, 0, 1]],
+            model=lens if lens in get_args(LensModel) else "opencv",
+            matrix=[[2122.4, 0.0 if lens in PANORAMAS else skew, 1634.8], [0, 2122.4, 877.7], [0, 0, 1]],
             distortion=LENSES[lens],
         ),
         pose=Pose.from_position(rotation.tolist(), position.tolist()),
@@ -45,7 +50,7 @@ def test_points_of_the_pitch_are_where_the_engine_has_them(lens, skew):
     np.testing.assert_allclose(movement.pixels(shot, points), expected, atol=1e-6)
 
 
-@pytest.mark.parametrize("lens", ["none", "barrel", "fisheye"])
+@pytest.mark.parametrize("lens", ["none", "barrel", "fisheye", "cylindrical"])
 @pytest.mark.parametrize(
     ("turned", "by"), [((0.001, 0, 0), (0, 0, 0)), ((0.004, -0.006, 0.002), (0.05, 0.1, -0.02)), ((0, 0, 0), (0, 0, 0))]
 )

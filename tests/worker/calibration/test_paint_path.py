@@ -115,6 +115,7 @@ def test_a_camera_without_a_pose_is_found_by_the_lines_of_its_own_sport():
     assert min(best.distance_m(CAMERA), other.distance_m(CAMERA)) < 0.03
 
 
+@pytest.mark.long
 def test_without_a_pose_the_paint_of_the_field_is_the_one_whose_lines_a_camera_explains():
     drawn = draw_field_paint(FieldMap.of(NETBALL), ON_ITS_STAND, frame(), Segmenter(MODEL_PATH, 1), 0)
     is_red = paint_markings(NETBALL, CAMERA) > 0.8

@@ -69,6 +69,7 @@ def test_of_three_cameras_the_two_that_were_exchanged_are_named():
     assert {name: end.accepted for name, end in found.items()} == {"left": False, "right": False, "middle": True}
 
 
+@pytest.mark.long
 def test_a_lens_that_was_measured_badly_is_no_exchange():
     found = located(
         {"left": lens(1190, centre=(90, -70)), "right": lens(1400)},

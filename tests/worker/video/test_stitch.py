@@ -90,6 +90,20 @@ def test_the_clip_is_the_view_of_every_moment(pair, tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["pano.mp4"]
 
 
+def test_seams_go_around_people_where_the_plan_says_so(pair, tmp_path):
+    made = {
+        seam: stitch(SCENE, pair, Plan(str(tmp_path / f"{seam}.mp4"), TOGETHER, encoding=FINE, seam=seam), told)
+        for seam in ("static", "people")
+    }
+    assert made["people"].frames == made["static"].frames
+    static, people = (np.array(frames_of(tmp_path / f"{seam}.mp4"), int) for seam in made)
+    changed = (np.abs(people - static).max(axis=-1) > 60).any(axis=0)
+    # Nowhere but near the seam, in the middle of the view.
+    columns = np.flatnonzero(changed.any(axis=0))
+    assert len(columns) > 0
+    assert np.abs(columns - VIEW.size[0] / 2).max() < 0.12 * VIEW.size[0]
+
+
 def test_clips_that_began_apart_are_put_in_time(tmp_path):
     clips = {
         "left": str(film(tmp_path / "l.mp4", LEFT, 5.0)),
@@ -123,6 +137,7 @@ def test_an_offset_that_cannot_be_found_is_not_made_up(tmp_path):
     assert stitch(SCENE, clips, Plan(str(tmp_path / "pano.mp4"), TOGETHER, end_s=0.4), told).frames == 10
 
 
+@pytest.mark.long
 def test_uneven_and_slow_clips_become_even_ones(tmp_path):
     rng = np.random.default_rng(1)
     times = np.cumsum(rng.uniform(0.01, 0.07, 50)).tolist()
@@ -212,6 +227,7 @@ def test_a_clip_that_ends_early_ends_the_view_unless_one_goes_on_without_it(tmp_
     assert off(frames_of(tmp_path / "all.mp4")[40], expected(1.6, [LEFT])) <= 2
 
 
+@pytest.mark.long
 def test_clips_that_end_within_a_frame_of_each_other_have_not_ended_early(tmp_path, pair):
     clips = pair | {"right": str(film(tmp_path / "r.mp4", RIGHT, 1.96))}
     assert stitch(SCENE, clips, Plan(str(tmp_path / "pano.mp4"), TOGETHER), told).ended == {}

@@ -83,6 +83,7 @@ def test_an_instant_tells_nothing(left, tmp_path):
     assert "shorter than 2 s" in found.why
 
 
+@pytest.mark.long
 def test_a_camera_comes_in_time_by_one_that_is_in_time(left, tmp_path):
     right = motion("right", film(tmp_path / "r.mp4", RIGHT, 6.0, begun_s=0.4))
     offsets, found = chain_offsets(PLACES, {"left": left, "right": right}, {"left": 0.25})

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -58,8 +60,13 @@ def halfway(view: StitchedView, y: float) -> Array:
     return view.project(CROWNED.lift(np.array([0.0, y])))
 
 
+@cache
+def true_preview() -> NDArray[np.uint8]:
+    return preview(CROWNED, CAMERAS, frames(), 1200)
+
+
 def test_the_preview_shows_the_pitch_where_its_viewpoint_says() -> None:
-    picture = preview(CROWNED, CAMERAS, frames(), 1200)
+    picture = true_preview()
     view = chosen_view(CROWNED, CAMERAS, ViewChoice(width=1200))
     assert picture.shape == (view.size[1], 1200, 3)
     for y in (-25.0, -15.0, 5.0):
@@ -71,7 +78,7 @@ def test_the_preview_shows_the_pitch_where_its_viewpoint_says() -> None:
 
 def test_a_preview_of_true_poses_shows_one_halfway_line() -> None:
     view = chosen_view(CROWNED, CAMERAS, ViewChoice(width=1200))
-    picture = preview(CROWNED, CAMERAS, frames(), 1200)
+    picture = true_preview()
     x, y = halfway(view, -25.0)
     assert lines_across(picture, round(y), slice(round(x) - 60, round(x) + 60)) == 1
 
@@ -86,7 +93,7 @@ def test_a_preview_of_wrong_poses_shows_two() -> None:
 
 
 def test_the_preview_has_no_hole_in_it() -> None:
-    picture = preview(CROWNED, CAMERAS, frames(), 1200)
+    picture = true_preview()
     unseen = (picture == BACKDROP).all(axis=-1)
     assert unseen.mean() < 0.02
     height, width = unseen.shape
@@ -147,6 +154,7 @@ def test_any_number_of_cameras_in_a_row(count: int) -> None:
     assert birdseye(CROWNED, cameras, pictures).shape == (741, 1111, 3)
 
 
+@pytest.mark.long
 def test_cameras_that_face_each_other_are_seen_from_outside() -> None:
     facing = [
         camera("near", (0.0, -55.0, 15.0), (0.0, 0.0), focal=450.0),

@@ -155,6 +155,7 @@ def test_who_looks_ahead_bridges_a_short_gap():
     assert sigma_deg(ahead[14]) < 0.5 * sigma_deg(blind[14])
 
 
+@pytest.mark.long
 def test_a_frame_that_shows_no_lines_is_coasted_over():
     moments = followed({15: np.full_like(still_picture(), 90)}, count=17)
     assert how(moments)[14:17] == ["measured", "coasted", "measured"]
@@ -187,6 +188,7 @@ def test_a_lens_that_is_zoomed_is_refused_however_long_it_is_looked_at(by):
     assert "measured" not in how(moments)[12:]
 
 
+@pytest.mark.long
 def test_a_picture_that_is_noisier_or_less_sharp_than_usual_is_measured():
     rng = np.random.default_rng(3)
     noisy = {number: with_noise(frame(number), rng, 15) for number in range(12, 16)}
