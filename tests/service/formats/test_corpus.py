@@ -12,7 +12,7 @@ from service.formats.table import FILE_FORMATS
 from service.schemas.problems import Problem
 from tests.formats_corpus.make import HERE
 from worker.calibration.geometry.camera import Camera, Pose
-from worker.calibration.geometry.lens import LENSES
+from worker.calibration.geometry.lens_models import LENSES
 
 CORPUS = json.loads((HERE / "expected.json").read_text())
 # ROS writes six decimals, of numbers that are multiplied by a focal length.
