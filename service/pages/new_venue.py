@@ -78,7 +78,7 @@ def plan(field: FieldOfPlay) -> dict[str, Any]:
 @data.post("/calibration", openapi_extra=needs_scope("admin"))
 async def calibration(request: Request, context: InContext, sender: FromSender) -> dict[str, Any]:
     """Answer the cameras of a calibration of any tool, as a venue takes them, and which of its files were not read."""
-    async with parsed_upload(request, context, None, "calibrate", sender, MOST_CALIBRATION_FILES) as form:
+    async with parsed_upload(request, context, None, "calibration", sender, MOST_CALIBRATION_FILES) as form:
         found = await run_in_threadpool(read_calibration, context, form)
     cameras = [one.model_dump(mode="json") for one in found.cameras_of_venue()]
     return {"format": found.format, "cameras": cameras, "not_read": found.not_read}
