@@ -86,6 +86,7 @@ def test_centimetres_and_a_turn_are_told_and_corrected(tmp_path, frames, capsys)
         assert math.dist(found.pose.position, true.pose.position) < 0.2
 
 
+@pytest.mark.long
 def test_a_frame_in_the_dark_tells_nothing(tmp_path, frames, capsys):
     dark = tmp_path / "dark"
     dark.mkdir()
