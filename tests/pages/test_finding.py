@@ -114,6 +114,7 @@ def test_where_no_calibration_can_follow_the_page_says_so(stub, visit, name):
     assert [depth(stub.http.get(f"/venues/{name}").json(), camera) for camera in ("left", "right")] == [40, 40]
 
 
+@pytest.mark.long
 def test_pages_that_were_proposed_the_same_id_search_for_venues_of_their_own(stub, visit, files):
     pages = [visit(stub.url, "/ui/new-venue") for _ in range(2)]
     assert len({page.get_by_label("Id", exact=True).first.input_value() for page in pages}) == 1

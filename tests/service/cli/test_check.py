@@ -103,6 +103,7 @@ def test_coefficients_in_another_order_are_told_and_not_taken_for_a_turn(tmp_pat
     assert camera["off_px"] < 2
 
 
+@pytest.mark.long
 def test_a_frame_in_the_dark_tells_nothing(tmp_path, frames, capsys):
     dark = tmp_path / "dark"
     dark.mkdir()
