@@ -2,7 +2,7 @@
 
 import math
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import typer
 
@@ -90,6 +90,10 @@ def stitch(
     preset: Annotated[
         str, typer.Option("--preset", help="Of libx264 and libx265, ultrafast to veryslow.")
     ] = "veryfast",
+    seam: Annotated[
+        Literal["static", "people"],
+        typer.Option("--seam", help="Seams stay where they are, or go around people, whom one camera shows whole."),
+    ] = "static",
     follow: Annotated[
         bool,
         typer.Option("--follow", help="Cameras shake: find where each is in every picture, by its lines."),
@@ -146,6 +150,7 @@ def stitch(
         audio,
         allow_missing,
         Encoding(codec, crf, preset),
+        seam,
     )
     changes = {name: None if value == AUTO else value for name, value in view.items() if value is not None}
     clip_stitching.stitch_clips(

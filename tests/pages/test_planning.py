@@ -38,7 +38,7 @@ def test_cameras_are_planned_moved_and_taken_to_a_new_venue(stub, visit):
     page.get_by_role("button", name="New venue with these cameras").click()
     expect(page.get_by_text("Planned: left.")).to_be_visible()
     expect(page.get_by_label("Sport")).to_have_value("volleyball")
-    page.locator("#frames input[type=file]").set_input_files(newcomer.frame("left"))
+    page.locator("#frames .drop-zone input").set_input_files(newcomer.frame("left"))
     page.route("**/find", lambda route: route.abort())
     with page.expect_request("**/find") as sent:
         page.get_by_role("button", name="Find the cameras").click()

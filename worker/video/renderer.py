@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from itertools import groupby
-from typing import Any
+from typing import Any, Protocol
 
 import cv2
 import numpy as np
@@ -30,18 +30,49 @@ Planes = tuple[Plane, Plane, Plane]
 Map = tuple[NDArray[np.int16], NDArray[np.uint16]]
 
 
-class Renderer:
-    """Makes pictures of one panorama. `threads`: how many strips are made at a time."""
+@dataclass(frozen=True)
+class Share:
+    """Opacity of a camera over those drawn earlier, 0 to 1: of luma (H, W) and of each chroma (H/2, W/2)."""
 
-    def __init__(self, panorama: Panorama, threads: int = 2) -> None:
+    luma: NDArray[np.float32]
+    chroma: NDArray[np.float32]
+
+
+class Seams(Protocol):
+    """Seams that move. `weights` (H, W) by camera: above 0 where it may be shown."""
+
+    weights: Sequence[NDArray[np.float32]]
+
+    @property
+    def levels(self) -> Sequence[tuple[int, int]]:
+        """Cameras and the levels of detail at which their frames are needed."""
+        ...
+
+    def move(self, panorama: Panorama) -> None:
+        """Take the sampling maps of a panorama of which sources alone have moved."""
+        ...
+
+    def update(self, levels: "Sequence[Mapping[int, Planes]]", shares: Sequence[Share]) -> None:
+        """Take the frames of a moment at each level of detail, and put the shares of it in place."""
+        ...
+
+
+class Renderer:
+    """Makes pictures of one panorama. `threads`: how many strips are made at a time; `seams`: if they move."""
+
+    def __init__(self, panorama: Panorama, threads: int = 2, seams: Seams | None = None) -> None:
         width, height = panorama.size
         if width % 2 or height % 2:
             raise ValueError(f"a view of {width}x{height} pixels: video takes even numbers only")
+        self._seams = seams
+        weights = [part.weight for part in panorama.parts] if seams is None else seams.weights
+        self._shares = _shares(weights)
         self._views = [_View.of(part) for part in panorama.parts]
         self._strips = [
-            _strip(panorama, slice(top, min(top + STRIP_ROWS, height))) for top in range(0, height, STRIP_ROWS)
+            _strip(panorama, self._shares, slice(top, min(top + STRIP_ROWS, height)))
+            for top in range(0, height, STRIP_ROWS)
         ]
-        self._levels = _levels_used(self._strips, len(panorama.parts))
+        self._levels = _levels_used(self._strips, len(panorama.parts), [] if seams is None else seams.levels)
         self._pool = ThreadPoolExecutor(threads)
         self._weights = [part.weight for part in panorama.parts]
         self.move(panorama)
@@ -54,6 +85,8 @@ class Renderer:
 
     def move(self, panorama: Panorama) -> None:
         """Take the sampling maps of a panorama that `fits`; vignetting stays where it was in the view."""
+        if self._seams is not None:
+            self._seams.move(panorama)
         self._maps = list(
             self._pool.map(
                 lambda strip: [
@@ -72,6 +105,8 @@ class Renderer:
                 self._levels,
             )
         )
+        if self._seams is not None:
+            self._seams.update(levels, self._shares)
         for _ in self._pool.map(lambda strip, maps: self._make(strip, maps, levels, onto), self._strips, self._maps):
             pass
 
@@ -160,28 +195,36 @@ class _Maps:
 # In advance
 
 
-def _strip(panorama: Panorama, rows: slice) -> _Strip:
-    stretches: list[_Stretch] = []
-    already = np.zeros((rows.stop - rows.start, panorama.size[0]), np.float32)
-    for number, part in enumerate(panorama.parts):
-        weight = part.weight[rows]
+def _shares(weights: Sequence[NDArray[np.float32]]) -> list[Share]:
+    """Return the opacities of cameras by their weights (H, W): each camera before all that were drawn earlier."""
+    already = np.zeros_like(weights[0])
+    found = []
+    for weight in weights:
         already += weight
-        # Weights in turn: each camera before all that were drawn earlier.
         share = np.where(weight > 0, weight / np.maximum(already, 1e-9), 0).astype(np.float32)
         share[share > 1 - 1e-6] = 1
+        found.append(Share(share, ((share[::2, ::2] + share[1::2, ::2]) / 2).astype(np.float32)))
+    return found
+
+
+def _strip(panorama: Panorama, shares: Sequence[Share], rows: slice) -> _Strip:
+    stretches: list[_Stretch] = []
+    for number, (part, share) in enumerate(zip(panorama.parts, shares, strict=True)):
         stretches += _stretches(number, part, rows, share)
-    return _Strip(rows, bool((already == 0).any()), stretches)
+    unseen = ~np.any([share.luma[rows] > 0 for share in shares], axis=0)
+    return _Strip(rows, bool(unseen.any()), stretches)
 
 
-def _stretches(number: int, part: Contribution, rows: slice, share: NDArray[np.float32]) -> list[_Stretch]:
+def _stretches(number: int, part: Contribution, rows: slice, share_of_view: Share) -> list[_Stretch]:
     """Return the stretches of a strip where a camera counts; blocks that are alike are merged."""
-    source = part.source[rows]
+    source, share = part.source[rows], share_of_view.luma[rows]
+    chroma = share_of_view.chroma[_halved(rows)]
     kinds = []
     for left in range(0, share.shape[1], BLOCK_COLUMNS):
         block = slice(left, min(left + BLOCK_COLUMNS, share.shape[1]))
         counts = share[:, block] > 0
         if counts.any():
-            kinds.append((block, bool((share[:, block] == 1).all()), _level(source[:, block], counts)))
+            kinds.append((block, bool((share[:, block] == 1).all()), median_level(source[:, block], counts)))
         else:
             kinds.append((block, False, -1))
     found = []
@@ -189,13 +232,13 @@ def _stretches(number: int, part: Contribution, rows: slice, share: NDArray[np.f
         if level >= 0:
             together = [block for block, *_ in blocks]
             columns = slice(together[0].start, together[-1].stop)
-            own = None if alone else _shares(share[:, columns])
+            own = None if alone else (share[:, columns], *2 * (chroma[:, _halved(columns)],))
             here = source[:, columns]
             found.append(_Stretch(number, level, columns, own, *_rise(part, here, _between(here, own))))
     return found
 
 
-def _level(source: NDArray[np.float32], counts: NDArray[np.bool_]) -> int:
+def median_level(source: NDArray[np.float32], counts: NDArray[np.bool_]) -> int:
     """Return how often a frame is halved before it is sampled, as the view's resolution allows (see `sampled`)."""
     (x_down, x_right), (y_down, y_right) = np.gradient(source[..., 0]), np.gradient(source[..., 1])
     area = float(np.median(np.abs(x_right * y_down - y_right * x_down)[counts]))
@@ -205,7 +248,7 @@ def _level(source: NDArray[np.float32], counts: NDArray[np.bool_]) -> int:
 def _maps(part: Contribution, rows: slice, stretch: _Stretch) -> _Maps:
     source = part.source[rows, stretch.columns]
     chroma = (_between(source, stretch.share) - np.array([0, CHROMA_ROW], np.float32)) / np.float32(2)
-    return _Maps(_map(source, stretch.level), _map(chroma, stretch.level))
+    return _Maps(sampling_map(source, stretch.level), sampling_map(chroma, stretch.level))
 
 
 def _between(source: NDArray[np.float32], share: Sequence[NDArray[np.float32]] | None) -> NDArray[np.float32]:
@@ -218,18 +261,14 @@ def _between(source: NDArray[np.float32], share: Sequence[NDArray[np.float32]] |
     return np.where(seen[0] & ~seen[1], upper, np.where(seen[1] & ~seen[0], lower, between))
 
 
-def _map(source: NDArray[np.float32], level: int) -> Map:
+def sampling_map(source: NDArray[np.float32], level: int) -> Map:
+    """Return the map to sample a plane that was halved `level` times at places (h, w, 2) of the whole one."""
     at: Any = np.ascontiguousarray(source)
     if level:
         at = (at + np.float32(0.5)) / np.float32(1 << level) - np.float32(0.5)
     nothing: Any = None
     places, parts = cv2.convertMaps(at, nothing, cv2.CV_16SC2)
     return np.asarray(places, np.int16), np.asarray(parts, np.uint16)
-
-
-def _shares(share: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
-    half = ((share[::2, ::2] + share[1::2, ::2]) / 2).astype(np.float32)
-    return np.ascontiguousarray(share), half, half
 
 
 def _rise(
@@ -245,8 +284,8 @@ def _rise(
     )
 
 
-def _levels_used(strips: Sequence[_Strip], cameras: int) -> list[list[int]]:
-    used: list[set[int]] = [set() for _ in range(cameras)]
+def _levels_used(strips: Sequence[_Strip], cameras: int, more: Sequence[tuple[int, int]]) -> list[list[int]]:
+    used: list[set[int]] = [{level for number, level in more if number == camera} for camera in range(cameras)]
     for strip in strips:
         for stretch in strip.stretches:
             used[stretch.camera].add(stretch.level)

@@ -14,12 +14,16 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from itertools import takewhile
 from math import inf
-from typing import TYPE_CHECKING, ClassVar, Protocol
+from typing import TYPE_CHECKING, ClassVar, Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
 
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.field import Field
 from worker.calibration.stitching.coverage import Unseen, unseen_part
 from worker.calibration.stitching.panorama import Panorama, panorama
+from worker.calibration.stitching.people_seam import FRAME_BORDER, seam_bands, shows_pitch
 from worker.calibration.stitching.photometric_alignment import evened_out
 from worker.calibration.stitching.photometry import Light
 from worker.calibration.stitching.views import StitchedView, ViewChoice, chosen_view
@@ -28,6 +32,7 @@ from worker.video.clips import Clip, ClipPicture, camera_for_clip
 from worker.video.encoding import Encoding, Sound, Writer
 from worker.video.errors import VideoError
 from worker.video.frame_timing import ClipTrack, FrameReader
+from worker.video.moving_seams import MovingSeams
 from worker.video.renderer import Renderer
 from worker.video.synchronisation import (
     FARTHEST_S,
@@ -49,6 +54,7 @@ EARLY_S = 0.25
 ROUNDING_S = 1e-6
 Report = Callable[[str, float], None]
 Begun = Callable[[Unseen], None]
+Seam = Literal["static", "people"]
 
 
 @dataclass(frozen=True)
@@ -135,7 +141,7 @@ class Plan:
 
     `offsets`: when a camera's clip began in the time of the first one's; found where there is none. `begin_s` and
     `end_s`: in the time of the first clip. `sound`: the camera whose sound is kept, `SILENT`: none, None: the first
-    that has any.
+    that has any. `seam`: whether seams stay or go around people.
     """
 
     output: str
@@ -146,6 +152,7 @@ class Plan:
     sound: str | None = None
     allow_missing: bool = False
     encoding: Encoding = field(default_factory=Encoding)
+    seam: Seam = "static"
     threads: int = field(default_factory=lambda: len(os.sched_getaffinity(0)))
 
 
@@ -215,7 +222,9 @@ def stitch(
         expected = _expected(ends, moments.begin_s, rate, plan)
         sound = None if sound_clip is None else Sound(sound_clip, moments.begin_s - offsets[sound_clip.camera])
         with Writer(plan.output, view.size, rate, plan.encoding, sound) as writer:
-            for made in _rendered(moments, geometry, view.size, writer, plan.threads):
+            on_pitch = shows_pitch(scene.pitch, view) if plan.seam == "people" else None
+            renderers = RendererFactory(on_pitch, float(rate), plan.threads, max(follow.border, FRAME_BORDER))
+            for made in _rendered(moments, geometry, view.size, writer, renderers):
                 if moments.count == 1:
                     begun(unseen_part(made.seen))
                 report(f"{moments.count / (time.monotonic() - started):.1f} fps", min(1.0, moments.count / expected))
@@ -232,8 +241,29 @@ def stitch(
     )
 
 
+@dataclass(frozen=True)
+class RendererFactory:
+    """Makes renderers of panoramas.
+
+    `on_pitch` (H, W): which pixels show the field, if seams go around people; `border`: of frames, that is not shown
+    then, in their widths.
+    """
+
+    on_pitch: NDArray[np.bool_] | None
+    rate: float
+    threads: int
+    border: float
+
+    def __call__(self, panorama: Panorama) -> Renderer:
+        """Return the renderer of a panorama."""
+        if self.on_pitch is None:
+            return Renderer(panorama, self.threads)
+        seams = MovingSeams(panorama, seam_bands(panorama, self.on_pitch, self.rate, self.border))
+        return Renderer(panorama, self.threads, seams)
+
+
 def _rendered(
-    moments: "ClipMoments", geometry: Geometry, size: tuple[int, int], writer: Writer, threads: int
+    moments: "ClipMoments", geometry: Geometry, size: tuple[int, int], writer: Writer, renderers: RendererFactory
 ) -> Iterator[Panorama]:
     """Make and write the view of each moment, which `moments` counts; yield its panorama."""
     import av
@@ -249,7 +279,7 @@ def _rendered(
             else:
                 if renderer is not None:
                     renderer.close()
-                renderer = Renderer(now, threads)
+                renderer = renderers(now)
             before = now
             frame = av.VideoFrame(*size, "yuv420p")
             renderer.render(pictures, planes_of(frame))

@@ -122,7 +122,7 @@ def draw_objects(pitch: Field, world: World, conditions: Conditions, canvas: Can
     people = list(_people(pitch, world, conditions))
     feet = np.array([person.foot for person in people]).reshape(-1, 3)
     people = [people[i] for i in np.flatnonzero(canvas.near(feet, feet, 12.0))]
-    _shadows(world, conditions, canvas, people)
+    draw_shadows(world, conditions, canvas, people)
     furniture = list(_furniture(pitch, conditions))
     starts, ends = (np.array([item[i] for item in furniture]) for i in (0, 1))
     furniture = [furniture[i] for i in np.flatnonzero(canvas.near(starts, ends, 2.0))]
@@ -244,7 +244,7 @@ def _people(pitch: Field, world: World, conditions: Conditions) -> Iterator[Pers
         )
 
 
-def _shadows(world: World, conditions: Conditions, canvas: Canvas, people: list[Person]) -> None:
+def draw_shadows(world: World, conditions: Conditions, canvas: Canvas, people: list[Person]) -> None:
     """Darken the ground beside people: one shadow in the sun, four in floodlight, a spot under clouds."""
     ink = np.zeros(canvas.colour.shape[:2], np.uint8)
     azimuth, elevation = world.sun

@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 
 from testbed.synthetic import moved
-from tests.worker.video.filming import PITCH, cameras, frame_at
-from worker.calibration.stitching.panorama import BACKDROP, panorama
+from tests.worker.video.filming import PITCH, PLAYER, cameras, empty, frame_at
+from worker.calibration.stitching.panorama import BACKDROP, Panorama, panorama
+from worker.calibration.stitching.people_seam import seam_bands, shows_pitch
 from worker.calibration.stitching.photometry import Light
 from worker.calibration.stitching.views import ViewChoice, chosen_view
+from worker.video.moving_seams import MovingSeams
 from worker.video.renderer import Renderer
 from worker.video.yuv_planes import EXACT, Picture, picture_of, planes_of
 
@@ -117,3 +119,52 @@ def test_every_format_becomes_the_same_colours(form, matrix, full):
     frame.colorspace, frame.color_range = matrix, 2 if full else 1
     seen = picture_of(frame).colours.astype(int)
     assert np.abs(seen[:, 6::16] - picture[:, 6::16].astype(int)).max() <= 4
+
+
+def people_seams():
+    view = chosen_view(PITCH, cameras, ViewChoice(width=960))
+    shown = panorama(PITCH, view, cameras)
+    return shown, Renderer(shown, seams=MovingSeams(shown, seam_bands(shown, shows_pitch(PITCH, view), 25)))
+
+
+def rendered_by(renderer, size, frames):
+    frame = av.VideoFrame(*size, "yuv420p")
+    frame.colorspace, frame.color_range = 1, 1
+    filmed = {camera: picture_of(av.VideoFrame.from_ndarray(one, format="bgr24")) for camera, one in frames.items()}
+    renderer.render(filmed, planes_of(frame))
+    return Picture(frame).colours.astype(int)
+
+
+def with_player(of, x, y):
+    """The pitch with somebody in blue."""
+    picture = empty(of.id).copy()
+    corners = of.project(np.array([x, y, 0.0]) + PLAYER)
+    cv2.fillConvexPoly(picture, cv2.convexHull(np.rint(16 * corners).astype(np.int32)), (250, 60, 20), cv2.LINE_AA, 4)
+    return picture
+
+
+def test_seams_that_move_stay_where_nobody_is():
+    shown, moving = people_seams()
+    frames = {one.id: empty(one.id) for one in cameras}
+    difference = np.abs(rendered_by(moving, shown.size, frames) - rendered_by(Renderer(shown), shown.size, frames))
+    # Frames are halved as the median of a stretch asks for, and stretches differ.
+    assert np.percentile(difference, 98) <= 1
+    assert difference.max() <= 10
+
+
+@pytest.mark.parametrize("x", [-0.4, 0.0, 0.4])
+def test_somebody_on_the_seam_is_of_one_camera(x):
+    shown, moving = people_seams()
+    rendered_by(moving, shown.size, {one.id: empty(one.id) for one in cameras})
+    frames = {one.id: with_player(one, x, -26.0) for one in cameras}
+    found, still = rendered_by(moving, shown.size, frames), rendered_by(Renderer(shown), shown.size, frames)
+    alone = [
+        rendered_by(
+            Renderer(Panorama(shown.size, [replace(part, weight=np.ones_like(part.weight))])), shown.size, frames
+        )
+        for part in shown.parts
+    ]
+    player = np.any([picture[..., 0] > 200 for picture in alone], axis=0)
+    player &= np.any([picture[..., 2] < 100 for picture in alone], axis=0)
+    moved, stayed = (min(np.abs(one - other)[player].mean() for other in alone) for one in (found, still))
+    assert moved < stayed / 5

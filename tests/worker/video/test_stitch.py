@@ -90,6 +90,20 @@ def test_the_clip_is_the_view_of_every_moment(pair, tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["pano.mp4"]
 
 
+def test_seams_go_around_people_where_the_plan_says_so(pair, tmp_path):
+    made = {
+        seam: stitch(SCENE, pair, Plan(str(tmp_path / f"{seam}.mp4"), TOGETHER, encoding=FINE, seam=seam), told)
+        for seam in ("static", "people")
+    }
+    assert made["people"].frames == made["static"].frames
+    static, people = (np.array(frames_of(tmp_path / f"{seam}.mp4"), int) for seam in made)
+    changed = (np.abs(people - static).max(axis=-1) > 60).any(axis=0)
+    # Nowhere but near the seam, in the middle of the view.
+    columns = np.flatnonzero(changed.any(axis=0))
+    assert len(columns) > 0
+    assert np.abs(columns - VIEW.size[0] / 2).max() < 0.12 * VIEW.size[0]
+
+
 def test_clips_that_began_apart_are_put_in_time(tmp_path):
     clips = {
         "left": str(film(tmp_path / "l.mp4", LEFT, 5.0)),

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from testbed.parameters import try_first
-from worker.calibration.geometry.lens import LENSES
+from worker.calibration.geometry.lens_models import LENSES
 from worker.calibration.geometry.rotation import rotation_matrices
 from worker.calibration.onboarding.boards import Board, BoardDetection, Charuco, find_board, other_size
 from worker.calibration.onboarding.lens_calibration import (

@@ -1,0 +1,230 @@
+"""Seams that go around people: where two cameras differ on the ground, all of a person is shown by one of them.
+
+The maps of a view are those of the ground. What stands on it is shown by each camera elsewhere, its feet alone at one
+place, so that a seam between the two cuts or doubles it. Shadows and lines lie on the ground: both cameras agree there.
+A place near a seam is taken by people where the difference of its cameras is not what it was over the last seconds.
+The hull of such places becomes one camera's: the cut then runs along its outline, where both show the ground. Labels of
+hulls have a memory: a person keeps a camera until all of it is well beyond the seam, and changes in one moment.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import combinations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from worker.calibration.geometry.camera import inside
+from worker.calibration.geometry.field import Field
+from worker.calibration.geometry.ground_view import box
+from worker.calibration.stitching.panorama import Panorama, every_nth_pixel, every_pixel
+from worker.calibration.stitching.views import StitchedView
+
+Mask = NDArray[np.uint8]
+Values = NDArray[np.float32]
+
+# A cell of the grid, in pixels of a view of so many columns.
+CELL_PX, CELL_COLUMNS = 2, 1920
+# How far from a seam people are looked for, in widths of the view: a near player with arms stretched.
+REACH = 0.1
+# What is so near to the border of a frame, in its widths, is half outside of it.
+FRAME_BORDER = 0.002
+# Cells over which one camera passes into the other beside people, and those beyond the seam from which on they change.
+MARGIN, CLEAR = 3, 8
+# Differences that are of people, in mean differences, and at least: the sum of three colours' levels. Faint ones count
+# where they hang together with more outright ones than noise makes.
+FAINT, OUTRIGHT, SPECK_CELLS = (3.0, 6.0), (6.0, 12.0), 2
+BESIDE = np.ones((3, 3), np.uint8)
+# Seconds in which what stays becomes a part of the ground: where nobody is, and where somebody stands.
+GROUND_S, STANDING_S = 1.0, 240.0
+# More of a band than this does not differ because of people: a light went on, or a camera changed its exposure.
+CROWD = 0.6
+
+
+@dataclass
+class SeamBand:
+    """Band of a view along the seam of two cameras, on a grid of cells, and its memory.
+
+    `cameras`: their numbers; `cell_px`; `around`: rows and columns of cells in the view; `zone` (h, w): 1 in the band;
+    `second` (h, w): 1 where the second camera is the better one; `pitch` (h, w): 1 on the field. `rate`: of moments, a
+    second.
+    """
+
+    cameras: tuple[int, int]
+    cell_px: int
+    around: tuple[slice, slice]
+    zone: Mask
+    second: Mask
+    pitch: Mask
+    rate: float
+    _ground: Values | None = field(default=None, init=False)
+    _noise: Values = field(init=False)
+    _hulls: Mask = field(init=False)
+    _labels: Mask = field(init=False)
+    _edge: Mask = field(init=False)
+    _clearance: Values = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Compute distances to the seam, and the edge of the band."""
+        self._hulls, self._labels = np.zeros_like(self.zone), self.second.copy()
+        self._edge = self.zone & np.asarray(cv2.dilate(1 - self.zone, np.ones((3, 3), np.uint8)))
+        seam = np.asarray(cv2.morphologyEx(self.second, cv2.MORPH_GRADIENT, np.ones((3, 3), np.uint8)))
+        self._clearance = np.asarray(cv2.distanceTransform(1 - seam, cv2.DIST_L2, 3), np.float32)
+
+    @property
+    def pixels(self) -> tuple[slice, slice]:
+        """Rows and columns of the view."""
+        rows, columns = (slice(self.cell_px * part.start, self.cell_px * part.stop) for part in self.around)
+        return rows, columns
+
+    def update(self, first: Values, second: Values) -> tuple[Values, Values]:
+        """Take what both cameras show (h, w, 3) of a moment, evened out; return where people are, and who shows them.
+
+        The first answer (h, w) is 1 in hulls of people, falling to 0 around them; the second is there how much the
+        second camera counts.
+        """
+        difference = np.asarray(cv2.blur(first - second, (3, 3)), np.float32)
+        if self._ground is None:
+            self._begin(difference)
+        apart = self._apart(difference)
+        faint, outright = (
+            ((apart > np.maximum(means * self._noise, levels)) & (self.zone > 0)).astype(np.uint8)
+            for means, levels in (FAINT, OUTRIGHT)
+        )
+        if np.count_nonzero(faint) > CROWD * np.count_nonzero(self.zone):
+            self._ground, faint = difference, np.zeros_like(faint)
+        hulls = _hulls(faint, outright) & self.zone
+        self._learn(difference, apart, faint | hulls)
+        self._labels, self._hulls = self._labelled(hulls), hulls
+        return self._blended(hulls, self._labels)
+
+    def _begin(self, difference: Values) -> None:
+        """Take what stands beyond the field as ground; people on the field are there from the first moment on."""
+        on_pitch = (self.zone & self.pitch) > 0
+        usual = np.median(difference[on_pitch], axis=0) if on_pitch.any() else 0.0
+        self._ground = np.where(self.pitch[..., None] > 0, np.float32(usual), difference)
+        apart = self._apart(difference)
+        self._noise = np.full(self.zone.shape, np.median(apart[on_pitch]) if on_pitch.any() else 0.0, np.float32)
+
+    def _apart(self, difference: Values) -> Values:
+        return np.asarray(cv2.transform(cv2.absdiff(difference, self._ground), np.ones((1, 3))), np.float32)
+
+    def _learn(self, difference: Values, apart: Values, taken: Mask) -> None:
+        """Follow the ground, hardly where it is taken."""
+        share = np.where(taken > 0, np.float32(1 / STANDING_S), np.float32(1 / GROUND_S)) / np.float32(self.rate)
+        assert self._ground is not None
+        self._ground += share[..., None] * (difference - self._ground)
+        self._noise += np.where(taken > 0, np.float32(0), share) * (apart - self._noise)
+
+    def _labelled(self, hulls: Mask) -> Mask:
+        """Return the labels (h, w): 1 for the second camera, by the memory and by where each hull lies."""
+        labels = self.second.copy()
+        count, numbers, boxes, _ = cv2.connectedComponentsWithStats(hulls, connectivity=4)
+        for number in range(1, count):
+            left, top, width, height, area = boxes[number].tolist()
+            here = slice(top, top + height), slice(left, left + width)
+            own = numbers[here] == number
+            before = own & (self._hulls[here] > 0)
+            better = self.second[here][own].mean()
+            edges = self.second[here][own & (self._edge[here] > 0)]
+            if edges.size and edges.min() == edges.max():
+                # What reaches beyond the band is shown there by the better camera.
+                label = edges[0]
+            elif better in (0, 1) and self._clearance[here][own].min() > CLEAR:
+                label = better
+            elif np.count_nonzero(before) > area / 8:
+                label = self._labels[here][before].mean() > 0.5
+            else:
+                label = better > 0.5
+            labels[here][own] = label
+        return labels
+
+    def _blended(self, hulls: Mask, labels: Mask) -> tuple[Values, Values]:
+        size = 2 * (2 * MARGIN + 1,)
+        people, second = (cv2.blur(mask.astype(np.float32), size) for mask in (hulls, hulls & labels))
+        around = np.minimum(np.asarray(people) * 4, 1).astype(np.float32) * self.zone
+        return around, np.asarray(second / np.maximum(people, np.float32(1e-6)), np.float32)
+
+
+def shows_pitch(pitch: Field, view: StitchedView) -> NDArray[np.bool_]:
+    """Return which pixels (H, W) of a view show the field."""
+    ground = np.abs(view.behind(pitch, every_nth_pixel(view.size))[..., :2])
+    on_pitch = (ground < [pitch.length / 2, pitch.width / 2]).all(axis=-1)
+    return every_pixel(on_pitch, view.size) > 0.5
+
+
+def seam_bands(made: Panorama, pitch: NDArray[np.bool_], rate: float, border: float = FRAME_BORDER) -> list[SeamBand]:
+    """Return the bands of the seams of a panorama.
+
+    `pitch` (H, W): where its pixels show the field; `rate`: of moments, a second; `border`: of each frame, in its
+    widths, that is not used.
+    """
+    cell = CELL_PX * max(1, round(made.size[0] / CELL_COLUMNS))
+    rows, columns = (extent // cell for extent in reversed(made.size))
+    cells = slice(0, cell * rows, cell), slice(0, cell * columns, cell)
+    owner, reach = made.owner[cells], REACH * made.size[0] / cell
+    seen = [
+        inside(part.source[cells], part.frame_size, border * part.frame_size[0]) | (part.weight[cells] > 0.99)
+        for part in made.parts
+    ]
+    pairs = [pair for pair in combinations(range(len(made.parts)), 2) if _seam(owner, pair).any()]
+    distances = [cv2.distanceTransform(1 - _seam(owner, pair), cv2.DIST_L2, 3) for pair in pairs]
+    nearest = np.argmin(distances, axis=0) if pairs else owner
+    found = []
+    for number, (i, j) in enumerate(pairs):
+        both = made.parts[i].weight[cells] + made.parts[j].weight[cells]
+        zone = seen[i] & seen[j] & (both > 0.99) & (nearest == number) & (distances[number] < reach)
+        if zone.any():
+            top_left, bottom_right = _with_border(zone)
+            around = slice(top_left[0], bottom_right[0]), slice(top_left[1], bottom_right[1])
+            parts = [np.ascontiguousarray(mask[around], np.uint8) for mask in (zone, owner == j, pitch[cells])]
+            found.append(SeamBand((i, j), cell, around, *parts, rate))
+    return found
+
+
+def opened(made: Panorama, bands: Sequence[SeamBand]) -> list[NDArray[np.float32]]:
+    """Return the weights (H, W) of each camera, with halves for both cameras of each band."""
+    weights = [part.weight.copy() for part in made.parts]
+    for band in bands:
+        zone = np.kron(band.zone, np.ones((band.cell_px, band.cell_px), np.uint8)) > 0
+        for number in band.cameras:
+            weights[number][band.pixels][zone] = 0.5
+    return weights
+
+
+def _seam(owner: NDArray[np.int8], pair: tuple[int, int]) -> Mask:
+    """1 in cells (h, w) beside the seam of two cameras."""
+    around = np.ones((3, 3), np.uint8)
+    first, second = (np.asarray(cv2.dilate((owner == number).astype(np.uint8), around)) for number in pair)
+    return first & second
+
+
+def _with_border(zone: NDArray[np.bool_]) -> tuple[tuple[int, int], tuple[int, int]]:
+    """Return the first and the last row and column of a mask, and a cell more where there is one."""
+    rows, columns = box(zone)
+    height, width = zone.shape
+    return (max(rows.start - 1, 0), max(columns.start - 1, 0)), (
+        min(rows.stop + 1, height),
+        min(columns.stop + 1, width),
+    )
+
+
+def _hulls(faint: Mask, outright: Mask) -> Mask:
+    """Return the convex hulls (h, w) of what differs and its blurred border, each of what hangs together."""
+    grown = cv2.morphologyEx(cv2.dilate(faint, BESIDE), cv2.MORPH_CLOSE, BESIDE)
+    _, numbers = cv2.connectedComponents(grown, connectivity=4)
+    people = np.bincount(numbers[outright > 0], minlength=int(numbers.max()) + 1) > SPECK_CELLS
+    people[0] = False
+    outlines, _ = cv2.findContours(people[numbers].astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
+    hulls = np.zeros_like(faint)
+    for outline in outlines:
+        cv2.fillConvexPoly(hulls, cv2.convexHull(outline), 1)
+    return hulls
+
+
+def blend_shares(people: Values, second: Values, static: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return how much the second camera counts in a band's pixels (H, W), by `SeamBand.update`; else as `static`."""
+    size = static.shape[1], static.shape[0]
+    fine, labels = (cv2.resize(part, size, interpolation=cv2.INTER_LINEAR) for part in (people, second))
+    return np.asarray(cv2.blendLinear(labels, static, fine, 1 - fine), np.float32)
