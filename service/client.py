@@ -399,7 +399,7 @@ class AsyncClient:
         """Return all API keys, without the keys themselves."""
         return (await self._call(ApiKeys, "GET", "/keys")).keys
 
-    async def make_key(self, wanted: KeyIn) -> MadeKey:
+    async def add_key(self, wanted: KeyIn) -> MadeKey:
         """Make an API key; its secret is in this answer alone."""
         return await self._call(MadeKey, "POST", "/keys", json=wanted.model_dump(mode="json", exclude_defaults=True))
 
@@ -520,7 +520,7 @@ class Client:
     picture = blocking(AsyncClient.picture)
     follow = blocking(AsyncClient.follow)
     keys = blocking(AsyncClient.keys)
-    make_key = blocking(AsyncClient.make_key)
+    add_key = blocking(AsyncClient.add_key)
     revoke_key = blocking(AsyncClient.revoke_key)
 
 

@@ -1,9 +1,10 @@
 """The bridge from a service to an MQTT broker: venues are published, and calibrated where a button is pressed."""
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from contextlib import aclosing, suppress
 from http import HTTPStatus
+from typing import TypeVar
 
 import aiomqtt
 import httpx
@@ -11,7 +12,7 @@ import httpx
 from service.cli.home_assistant import PRESS, Topics, discovery_of, state_of
 from service.cli.printing import OngoingTrouble, print_note
 from service.client import PATIENCE_S, AsyncClient, Refused
-from service.client_errors import is_passing
+from service.client_errors import is_passing, pause_s_of
 
 # Every message arrives at least once, and is kept for who subscribes later.
 QOS = 1
@@ -20,6 +21,8 @@ AGAIN_S = 5.0
 # A new venue may appear so much later.
 NEW_VENUES_S = 10.0
 ONLINE, OFFLINE = "online", "offline"
+NO_ACCESS = (HTTPStatus.UNAUTHORIZED, HTTPStatus.FORBIDDEN)
+Answer = TypeVar("Answer")
 
 
 async def publish_venues(
@@ -33,9 +36,8 @@ async def publish_venues(
     while True:
         try:
             async with connect(aiomqtt.Will(topics.status, OFFLINE, QOS, retain=True)) as broker:
-                trouble.over("Connected again")
                 try:
-                    await Bridge(broker, service, topics).run()
+                    await Bridge(broker, service, topics).run(lambda: trouble.over("Connected again"))
                 finally:
                     with suppress(aiomqtt.MqttError):
                         await broker.publish(topics.status, OFFLINE, QOS, retain=True)
@@ -54,12 +56,14 @@ class Bridge:
     def __init__(self, broker: aiomqtt.Client, service: tuple[str, str | None], topics: Topics) -> None:
         self._broker, self._service, self._topics = broker, service, topics
         self._followed: set[str] = set()
+        self._trouble = OngoingTrouble()
 
-    async def run(self) -> None:
+    async def run(self, note_connection: Callable[[], None]) -> None:
         """Publish all venues, and what becomes of them, and take commands."""
         async with AsyncClient(*self._service) as client, asyncio.TaskGroup() as tasks:
             await self._follow_new(client, tasks)
             await self._retain(self._topics.status, ONLINE)
+            note_connection()
             tasks.create_task(self._take_messages(client, tasks))
             while True:
                 await asyncio.sleep(NEW_VENUES_S)
@@ -81,14 +85,19 @@ class Bridge:
             ):
                 async for _ in events:
                     await self._publish(client, venue_id)
+            await self._take_back(venue_id)
         except Refused as refused:
-            if refused.status != HTTPStatus.NOT_FOUND:
+            if refused.busy or refused.status in NO_ACCESS:
                 raise
-        await self._take_back(venue_id)
+            if refused.status == HTTPStatus.NOT_FOUND:
+                await self._take_back(venue_id)
+            else:
+                self._trouble.say(f"Venue {venue_id} stays as it was published: {refused}")
         self._followed.discard(venue_id)
 
     async def _publish(self, client: AsyncClient, venue_id: str) -> None:
-        venue, health = await client.venue(venue_id), await client.venue_health(venue_id)
+        venue = await _when_admitted(lambda: client.venue(venue_id))
+        health = await _when_admitted(lambda: client.venue_health(venue_id))
         page = client.url_of(f"/ui/venues/{venue_id}")
         await self._retain(self._topics.config(venue_id), discovery_of(venue, self._topics, page))
         await self._retain(self._topics.state(venue_id), state_of(health))
@@ -119,6 +128,17 @@ class Bridge:
                 for one in sorted(self._followed):
                     with suppress(Refused):
                         await self._publish(client, one)
+
+
+async def _when_admitted(ask: Callable[[], Awaitable[Answer]]) -> Answer:
+    """Return an answer of the service, asked again when it says where the key has asked too often."""
+    while True:
+        try:
+            return await ask()
+        except Refused as refused:
+            if refused.status != HTTPStatus.TOO_MANY_REQUESTS:
+                raise
+            await asyncio.sleep(pause_s_of(refused, 1.0))
 
 
 async def _calibrate(client: AsyncClient, venue_id: str) -> None:

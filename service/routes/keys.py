@@ -37,7 +37,7 @@ def list_keys(by: Administrator, context: InContext) -> ApiKeys:  # noqa: ARG001
 
 
 @router.post("", openapi_extra=needs_scope("admin"), status_code=201, responses=problem_responses("key-exists"))
-def make_key(wanted: KeyIn, by: Administrator, context: InContext) -> MadeKey:
+def add_key(wanted: KeyIn, by: Administrator, context: InContext) -> MadeKey:
     """Make a key and return it, this once: what is stored is its hash."""
     try:
         key = context.keys.add(wanted.name, wanted.scope, wanted.expires_at, wanted.venues)

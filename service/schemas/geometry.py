@@ -269,12 +269,16 @@ class PictureMotion(Schema):
     since: int = Field(description="The earlier revision.")
     revision: int = Field(description="The revision in use.")
     image_size: list[int] = Field(description="Width and height of the picture, pixels.")
-    ground: Homography | None = Field(description="Of what lies on the ground; null where no ground is in view.")
+    ground: Homography | None = Field(
+        description="Of what lies on the ground; null where hardly any ground is in both pictures: draw anew."
+    )
     ground_residual_px: float | None = Field(
         description="Largest distance between it and the cameras, pixels: lenses bend what a homography keeps straight."
     )
-    far: Homography = Field(description="Of what is so far away that only the camera's rotation and zoom move it.")
-    far_residual_px: float = Field(description="The same for `far`.")
+    far: Homography | None = Field(
+        description="Of what is so far away that only the camera's rotation and zoom move it; null as above."
+    )
+    far_residual_px: float | None = Field(description="The same for `far`.")
 
 
 class Movement(Schema):

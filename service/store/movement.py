@@ -57,24 +57,26 @@ def picture_motion(field: FieldOfPlay, before: PosedCamera, after: PosedCamera) 
     half = np.array([field.length_m, field.width_m]) / 2 + BESIDE_M
     steps = [np.linspace(-side, side, GRID) for side in half]
     ground = np.stack(np.meshgrid(*steps), axis=-1).reshape(-1, 2)
-    on_ground = _homography(before, pixels(before, ground), pixels(after, ground))
+    on_ground = _homography(before, pixels(before, ground), after, pixels(after, ground))
     (fx, _, _), (_, fy, _), _ = before.intrinsics.matrix
     width, height = before.image_size
     sides = np.meshgrid(np.linspace(-1, 1, GRID) * width / fx, np.linspace(-1, 1, GRID) * height / fy)
     rays = np.stack([*sides, np.ones_like(sides[0])], axis=-1).reshape(-1, 3)
     turn = _rotation(after) @ _rotation(before).T
-    far = _homography(before, _seen(before, rays), _seen(after, rays @ turn.T))
+    far = _homography(before, _seen(before, rays), after, _seen(after, rays @ turn.T))
     return {
         "ground": None if on_ground is None else on_ground[0],
         "ground_residual_px": None if on_ground is None else on_ground[1],
-        "far": np.eye(3).tolist() if far is None else far[0],
-        "far_residual_px": 0.0 if far is None else far[1],
+        "far": None if far is None else far[0],
+        "far_residual_px": None if far is None else far[1],
     }
 
 
-def _homography(before: PosedCamera, was: Array, now: Array) -> tuple[list[list[float]], float] | None:
-    """Return the homography between pixels (N, 2), and the largest distance from it; None if too few are in view."""
-    seen = _inside(before, was) & np.isfinite(now).all(axis=1)
+def _homography(
+    before: PosedCamera, was: Array, after: PosedCamera, now: Array
+) -> tuple[list[list[float]], float] | None:
+    """Return the homography between pixels (N, 2), and the largest distance from it; None if both see too few."""
+    seen = _inside(before, was) & _inside(after, now)
     if seen.sum() < LEAST_SEEN:
         return None
     found, _ = cv2.findHomography(was[seen], now[seen])

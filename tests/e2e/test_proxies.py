@@ -54,6 +54,7 @@ def large_png() -> bytes:
     return picture[:33] + chunk + zlib.crc32(b"prIv" + data).to_bytes(4, "big") + picture[33:]
 
 
+@pytest.mark.long
 def test_an_upload_of_200_megabytes_arrives(http, name):
     frame = large_png()
     files = [(camera, (f"{camera}.png", frame)) for camera, count in FRAMES.items() for _ in range(count)]

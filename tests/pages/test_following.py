@@ -160,6 +160,7 @@ def test_the_head_of_a_job_that_begins_says_so_as_the_panel_below_does(stub, vis
     stub.http.post(f"/jobs/{job}/cancel")
 
 
+@pytest.mark.long
 def test_a_link_that_is_clicked_as_a_job_ends_is_followed(stub, visit):
     job = stub.submitted(stub.venue("left-behind", "accept 60"))
     stub.running(job)
@@ -178,6 +179,7 @@ def test_a_link_that_is_clicked_as_a_job_ends_is_followed(stub, visit):
     expect(page).to_have_url(re.compile("/ui/venues/left-behind$"))
 
 
+@pytest.mark.long
 def test_a_job_shows_its_end_on_a_page_that_a_download_was_begun_from(stub, visit):
     job = stub.submitted(stub.venue("downloaded", "accept 60"))
     stub.running(job)
@@ -189,6 +191,7 @@ def test_a_job_shows_its_end_on_a_page_that_a_download_was_begun_from(stub, visi
     expect(page.locator(".badge").first).to_have_text("Cancelled")
 
 
+@pytest.mark.long
 def test_the_list_of_venues_goes_on_while_a_link_of_it_has_the_focus(stub, stored, visit):
     stub.venue("chosen")
     page = visit(stub.url, list_from("chosen"))

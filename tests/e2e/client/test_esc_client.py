@@ -236,6 +236,7 @@ def test_alone_it_reads_what_a_newer_service_says(service, program, name):
         assert program(READ, newer.url, name) == ["breathing hazy poses.current"]
 
 
+@pytest.mark.long
 def test_the_programs_of_its_page_run(service, program, tmp_path, name):
     service.venue(name)
     blocking, finding, awaited = (

@@ -13,6 +13,9 @@ from testbed import warm
 from testbed.network_cameras import NetworkCamera
 from testbed.running import venue
 
+# The SDK loads for seconds, in a process for each assistant.
+pytestmark = pytest.mark.slow
+
 
 class Assistant:
     """A client of the protocol, on the pipes of the command."""

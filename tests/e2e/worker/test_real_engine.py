@@ -31,7 +31,6 @@ def stored_position(service: Service, name: str, index: int = 0) -> list[float]:
     return service.http.get(f"/venues/{name}").json()["cameras"][index]["pose"]["position"]
 
 
-@pytest.mark.long
 def test_outdated_poses_are_found_again_and_stored(service, name):
     job = calibrated(service, venue(name), frames())
     result = job["result"]

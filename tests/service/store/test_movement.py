@@ -2,6 +2,7 @@
 
 from typing import get_args
 
+import cv2
 import numpy as np
 import pytest
 
@@ -100,6 +101,22 @@ def test_a_camera_that_stands_still_has_a_picture_that_stands_still():
     motion = movement.picture_motion(FIELD, camera(), camera())
     for name in ("ground", "far"):
         np.testing.assert_allclose(motion[name], np.eye(3), atol=1e-6)
+
+
+@pytest.mark.parametrize("lens", ["none", "barrel", "fisheye"])
+def test_a_camera_that_turned_away_shows_nothing_of_its_old_picture(lens):
+    away = camera(lens)
+    turned = cv2.Rodrigues(np.array([0, np.pi, 0]))[0] @ cv2.Rodrigues(np.array(away.pose.rotation))[0]
+    pose = Pose.from_position(cv2.Rodrigues(turned)[0].ravel().tolist(), away.pose.position)
+    motion = movement.picture_motion(FIELD, away, away.model_copy(update={"pose": pose}))
+    assert set(motion.values()) == {None}
+
+
+def test_a_picture_that_shows_a_strip_of_the_old_one_has_its_motion():
+    before, after = camera("none"), camera("none", turned=(0, -1.0, 0))
+    motion = movement.picture_motion(FIELD, before, after)
+    assert motion["far"] is not None
+    assert motion["far_residual_px"] < 1e-3
 
 
 def test_a_camera_that_looks_at_the_sky_has_no_ground():

@@ -143,6 +143,7 @@ def test_a_focal_length_that_heat_has_changed_is_found_when_asked_for():
     assert found.cameras[0].camera.intrinsics.matrix[0, 0] == pytest.approx(600.0, abs=0.3)
 
 
+@pytest.mark.long
 def test_a_lens_that_is_not_the_one_that_was_given_is_suspected_with_its_numbers():
     left, right = in_wind()
     other = replace(left.intrinsics, distortion=left.intrinsics.distortion + [0.02, 0, 0, 0, 0])

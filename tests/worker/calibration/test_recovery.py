@@ -224,6 +224,7 @@ def test_an_upside_down_frame_is_neither_accepted_nor_proposed():
     assert (found.accepted, found.knocked) == (False, False)
 
 
+@pytest.mark.long
 def test_a_request_to_stop_ends_a_search_anywhere(monkeypatch):
     asked = []
 

@@ -29,7 +29,7 @@ pytestmark = pytest.mark.slow
 
 LIMIT, VENUES = 3, 8
 # Several times as many as are fetched from at once.
-SILENT = 40
+SILENT = 20
 
 
 def shows(cameras, _, frames=1, spacing_s=0, within_s=None):

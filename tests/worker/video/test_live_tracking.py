@@ -170,6 +170,7 @@ def zoomed(camera, by):
     return camera.with_lens(replace(camera.intrinsics, matrix=matrix))
 
 
+@pytest.mark.long
 def test_a_camera_whose_lines_are_elsewhere_is_not_told_of(clip):
     with Tracking(clip, stored=moved(TRUE, (0.0, 0.2, 0.0))) as tracking:
         assert "its lines are not seen near where the stored pose expects them" in tracking.warnings.get(timeout=60)

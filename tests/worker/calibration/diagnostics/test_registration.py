@@ -99,6 +99,7 @@ def test_four_metres_apart_is_within_reach() -> None:
     assert register(LEFT, believed).error_px == pytest.approx(true, rel=0.05)
 
 
+@pytest.mark.long
 def test_the_order_of_the_cameras_only_turns_the_sign() -> None:
     believed = moved(RIGHT, rotation=(0.003, 0.001, 0.0))
     one, other = register(LEFT, believed), register(believed, LEFT)

@@ -256,6 +256,7 @@ def test_cells_and_ninths_are_counted_where_corners_are():
     assert set(coverage.empty) & {"top left", "bottom right"} == set()
 
 
+@pytest.mark.long
 def test_the_picture_shows_bare_cells_corners_and_the_principal_point():
     found = from_the_left()
     picture = coverage_picture(found)

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from testbed.parameters import try_first
 from testbed.synthetic import (
     CROWNED,
     GRASS,
@@ -143,7 +142,8 @@ def test_the_geometry_of_the_preview_is_exact_to_a_twentieth_of_a_pixel() -> Non
         assert np.quantile(np.linalg.norm(exact - quick, axis=-1)[judged], 0.999) < 0.05
 
 
-@pytest.mark.parametrize("count", try_first([3, 1]))
+@pytest.mark.long
+@pytest.mark.parametrize("count", [3, 1])
 def test_any_number_of_cameras_in_a_row(count: int) -> None:
     cameras = row() if count == 3 else row()[1:2]
     pictures = {one.id: paint_frame(CROWNED, one) for one in cameras}

@@ -118,6 +118,7 @@ def test_its_motion_is_known_as_well_as_it_says():
     assert 0.1 < np.mean(squared) < 2.0
 
 
+@pytest.mark.long
 def test_where_it_will_be_is_told_with_a_sigma_that_covers_it():
     ahead = 3
     follower = CameraTracker(CROWNED, [STORED], {"left": frame(0)}, FRAMES_PER_SECOND)
@@ -181,7 +182,8 @@ def magnified(picture: np.ndarray, by: float) -> np.ndarray:
     return cv2.warpAffine(picture, matrix, LEFT.intrinsics.size, flags=cv2.INTER_CUBIC, borderMode=cv2.BORDER_REFLECT)
 
 
-@pytest.mark.parametrize("by", try_first([1.02, 1.01]))
+@pytest.mark.long
+@pytest.mark.parametrize("by", [1.02, 1.01])
 def test_a_lens_that_is_zoomed_is_refused_however_long_it_is_looked_at(by):
     """A pose that nobody knows any more must not be drawn to where a part of the lines fits it."""
     moments = followed({number: magnified(frame(number), by) for number in range(12, 24)}, count=24)
@@ -198,6 +200,7 @@ def test_a_picture_that_is_noisier_or_less_sharp_than_usual_is_measured():
     assert residual_px(moments) < 0.15
 
 
+@pytest.mark.long
 def test_a_pose_does_not_jump_when_lines_are_hidden_that_a_wrong_lens_puts_beside_their_places():
     lens = LEFT.intrinsics
     wrong = LEFT.with_lens(replace(lens, distortion=lens.distortion + [0.01, 0, 0, 0, 0]))
