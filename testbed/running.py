@@ -122,9 +122,9 @@ class Service:
         return wait_for(lambda: (job := self.job(job_id))["progress"] and job)
 
     @contextmanager
-    def jobs_held(self) -> Iterator[None]:
-        """No job ends meanwhile: the stub of the engine runs for as long as a file lies there."""
-        hold = self.data / "hold"
+    def jobs_held(self, venue_id: str) -> Iterator[None]:
+        """No job of a venue ends meanwhile: the stub of the engine runs for as long as a file lies there."""
+        hold = self.data / f"hold {venue_id}"
         hold.touch()
         try:
             yield

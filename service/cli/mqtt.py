@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 PORTS = {"mqtt": 1883, "mqtts": 8883}
 PASSWORD = "ESC_MQTT_PASSWORD"
+# Its client warns of more than ten that are not confirmed yet.
+MESSAGES_AT_ONCE = 10
 
 
 def mqtt(
@@ -99,5 +101,11 @@ class _Connection:
         from aiomqtt import Client
 
         return Client(
-            self.host, self.port, username=self._user, password=self._password, tls_context=self._tls, will=will
+            self.host,
+            self.port,
+            username=self._user,
+            password=self._password,
+            tls_context=self._tls,
+            will=will,
+            max_concurrent_outgoing_calls=MESSAGES_AT_ONCE,
         )

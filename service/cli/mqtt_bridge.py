@@ -42,6 +42,8 @@ async def publish_venues(
                     with suppress(aiomqtt.MqttError):
                         await broker.publish(topics.status, OFFLINE, QOS, retain=True)
         except Exception as caught:
+            # To take leave of the broker has failed, no more.
+            _raise_if_cancelled()
             error = _first_of(caught)
             is_away = isinstance(error, httpx.TransportError | Refused) and is_passing(error)
             if not (is_away or isinstance(error, aiomqtt.MqttError)):
@@ -109,11 +111,13 @@ class Bridge:
 
     async def _retain(self, topic: str, payload: str) -> None:
         await self._broker.publish(topic, payload, QOS, retain=True)
+        _raise_if_cancelled()
 
     async def _take_messages(self, client: AsyncClient, tasks: asyncio.TaskGroup) -> None:
         states, commands = self._topics.state("+"), self._topics.calibrate("+")
         for topic in (states, commands, self._topics.birth):
             await self._broker.subscribe(topic, QOS)
+        _raise_if_cancelled()
         async for message in self._broker.messages:
             venue_id = message.topic.value.split("/")[-2]
             if message.topic.matches(commands):
@@ -148,6 +152,13 @@ async def _calibrate(client: AsyncClient, venue_id: str) -> None:
         print_note(f"Calibrate {venue_id}: job {job.id}")
     except Refused as refused:
         print_note(f"Calibrate {venue_id}: {refused}")
+
+
+def _raise_if_cancelled() -> None:
+    """Raise a cancellation that the broker's client has lost: `asyncio.wait_for` loses some before Python 3.12."""
+    task = asyncio.current_task()
+    if task is not None and task.cancelling():
+        raise asyncio.CancelledError
 
 
 def _first_of(error: Exception) -> Exception:

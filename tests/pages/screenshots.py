@@ -65,9 +65,7 @@ def take_all(browser: Browser, url: str, job: str, search: str, scheme: str, fol
             ("job", f"/ui/jobs/{job}"),
             ("found", f"/ui/jobs/{search}"),
             ("calibrate", "/ui/venues/newcomer/calibrate"),
-            ("ignore", "/ui/venues/newcomer/ignore"),
             ("settings", "/ui/venues/newcomer/settings"),
-            ("refusal", "/refusals/residual"),
         ):
             if name == "live":
                 page.request.put("/venues/south/live", data=LIVE)

@@ -43,7 +43,7 @@ def open_venue(stub, visit):
 def test_the_page_of_a_venue_shows_a_new_job_its_end_and_its_revision(stub, open_venue):
     page = open_venue("watched")
     expect(page.get_by_role("heading", name="Not calibrated yet")).to_be_visible()
-    with stub.jobs_held():
+    with stub.jobs_held("watched"):
         job = stub.submitted("watched")
         going_on = page.get_by_role("region", name="The job that is going on")
         expect(going_on.locator(".badge")).to_have_text("Running")

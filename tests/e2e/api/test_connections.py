@@ -86,7 +86,7 @@ def test_whose_answer_is_held_is_not_put_out_by_strangers(crowded):
 
 def test_only_so_many_answers_are_held_for_jobs(crowded):
     with ExitStack() as stack:
-        stack.enter_context(crowded.jobs_held())
+        stack.enter_context(crowded.jobs_held("long"))
         job = crowded.submitted(crowded.venue("long"))
         held = []
         for _ in range(2):

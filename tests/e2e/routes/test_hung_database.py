@@ -30,11 +30,8 @@ def asked(service, path):
 
 
 @on_servers
-def test_a_locked_table_is_told_within_seconds_and_readiness_at_once(start, home, tmp_path):
-    # Longer than readiness waits, shorter than unless told otherwise.
-    options = {"options": "-c lock_timeout=3s"}
-    database = sa.make_url(home.database_url(tmp_path / "esc")).update_query_dict(options)
-    service = start("serve", ESC_AUTH="off", ESC_DATABASE_URL=database.render_as_string(hide_password=False))
+def test_a_locked_table_is_told_within_seconds_and_readiness_at_once(start, home):
+    service = start("serve", ESC_AUTH="off")
     service.venue("v")
     with ThreadPoolExecutor(CALLERS) as callers, home.table_locked(service.data, "venues, jobs"):
         waiting = [callers.submit(asked, service, "/venues/v") for _ in range(CALLERS)]

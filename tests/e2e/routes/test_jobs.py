@@ -58,7 +58,7 @@ def test_a_venue_changed_meanwhile_keeps_its_new_poses(service, name):
 @in_both_homes
 def test_many_submissions_at_once_are_one_job(service, name):
     service.venue(name)
-    with service.jobs_held(), ThreadPoolExecutor(8) as pool:
+    with service.jobs_held(name), ThreadPoolExecutor(8) as pool:
         answers = list(pool.map(lambda _: service.submit(name), range(8)))
     assert sorted(answer.status_code for answer in answers) == [200] * 7 + [202]
     job = {answer.json()["id"] for answer in answers}
@@ -70,7 +70,7 @@ def test_many_submissions_at_once_are_one_job(service, name):
 def test_a_key_that_comes_twice_at_once_is_one_job_whatever_came_with_it(service, name):
     service.venue(name)
     key = {"Idempotency-Key": "k"}
-    with service.jobs_held(), ThreadPoolExecutor(8) as pool:
+    with service.jobs_held(name), ThreadPoolExecutor(8) as pool:
         answers = list(pool.map(lambda number: service.submit(name, number % 2, headers=key), range(8)))
     assert sorted(answer.status_code for answer in answers) == [200] * 3 + [202] + [422] * 4
     refused = {answer.json()["type"] for answer in answers if answer.status_code == 422}
@@ -95,7 +95,7 @@ def test_but_no_longer_than_asked(service, name):
 
 
 def test_progress_is_shown(service, name):
-    with service.jobs_held():
+    with service.jobs_held(name):
         job = service.submitted(service.venue(name))
         progress = wait_for(lambda: (p := service.job(job)["progress"]) and p["stage"] == "evolution" and p)
     assert progress == {"stage": "evolution", "fraction": 0.5, "generation": 7, "loss": 0.3}
@@ -106,7 +106,7 @@ def test_progress_is_shown(service, name):
 def test_events_tell_the_progress_and_the_end(service, name):
     lines = []
     with ExitStack() as held:
-        held.enter_context(service.jobs_held())
+        held.enter_context(service.jobs_held(name))
         job = service.submitted(service.venue(name))
         with service.http.stream("GET", f"/jobs/{job}/events") as answer:
             assert answer.headers["content-type"].startswith("text/event-stream")

@@ -35,7 +35,7 @@ def poses(service, venue):
 
 def test_a_killed_worker_comes_back_and_its_job_ends_once(start):
     service = start().ready()
-    with service.jobs_held():
+    with service.jobs_held("v"):
         job = service.submitted(service.venue("v"))
         service.running(job)
         worker = service.worker()
@@ -57,7 +57,7 @@ def test_a_worker_on_another_machine_takes_over(start, worker_beside):
     service = start("serve", ESC_TAKEOVER_AFTER_S=str(silence_s))
     workers = [worker_beside(service, f"worker-{number}") for number in (1, 2)]
     service.ready()
-    with service.jobs_held():
+    with service.jobs_held("v"):
         job = service.submitted(service.venue("v"))
         service.running(job)
         (doomed,) = (worker for worker in workers if children(worker.pid))
@@ -153,7 +153,7 @@ def test_while_the_database_is_away_the_service_says_so_and_a_job_goes_on(start,
     # Without a key to look up: otherwise it could not tell whether the caller may know.
     service = start("up", ESC_AUTH="off").ready()
     with ExitStack() as away:
-        with service.jobs_held():
+        with service.jobs_held("v"):
             job = service.submitted(service.venue("v"))
             service.running(job)
             (computing,) = service.begun(job)
@@ -220,7 +220,7 @@ def test_a_disk_without_a_byte_left_stops_nobody_for_longer_than_that(small_disk
     service.venue("v")
     service.venue("w")
     with ExitStack() as full:
-        with service.jobs_held():
+        with service.jobs_held("v"):
             job = service.submitted("v")
             service.running(job)
             full.enter_context(filled(small_disk))

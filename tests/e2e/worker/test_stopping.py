@@ -22,7 +22,7 @@ AT_ONCE_S = 15
 def test_a_worker_that_is_stopped_lets_its_job_end_and_takes_no_other(start, worker_beside):
     service = start("serve")
     worker = worker_beside(service, "w")
-    with service.jobs_held():
+    with service.jobs_held("v"):
         running = service.submitted(service.venue("v"))
         service.running(running)
         waiting = service.submitted(service.venue("w"))
@@ -39,7 +39,7 @@ def test_stops_in_the_middle_of_a_job_do_not_count_as_its_attempts(start, worker
     service = start("serve", ESC_DRAIN_S="0")
     job = service.submitted(service.venue("v"))
     # As often as the queue begins a job whose worker has died.
-    with service.jobs_held():
+    with service.jobs_held("v"):
         for _ in range(1 + BEGINS_AGAIN):
             worker = worker_beside(service, "w")
             service.running(job)
@@ -86,7 +86,7 @@ def test_two_workers_of_one_name_do_not_run_on_two_machines(start, worker_beside
     # Before that the second one has to see a heartbeat of the first, which a busy machine delays.
     service = start("serve", ESC_TAKEOVER_AFTER_S="6")
     first = worker_beside(service, "truck", "one")
-    with service.jobs_held():
+    with service.jobs_held("v"):
         job = service.submitted(service.venue("v"))
         service.running(job)
         second = worker_beside(service, "truck", "two")

@@ -7,7 +7,7 @@ The hull of such places becomes one camera's: the cut then runs along its outlin
 hulls have a memory: a person keeps a camera until all of it is well beyond the seam, and changes in one moment.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
 
@@ -27,7 +27,7 @@ Values = NDArray[np.float32]
 # A cell of the grid, in pixels of a view of so many columns.
 CELL_PX, CELL_COLUMNS = 2, 1920
 # How far from a seam people are looked for, in widths of the view: a near player with arms stretched.
-REACH = 0.1
+REACH = 0.2
 # What is so near to the border of a frame, in its widths, is half outside of it.
 FRAME_BORDER = 0.002
 # Cells over which one camera passes into the other beside people, and those beyond the seam from which on they change.
@@ -94,9 +94,11 @@ class SeamBand:
         )
         if np.count_nonzero(faint) > CROWD * np.count_nonzero(self.zone):
             self._ground, faint = difference, np.zeros_like(faint)
-        hulls = _hulls(faint, outright) & self.zone
+        # Who was seen outright a moment ago is still there.
+        people = _people(faint, outright | (faint & self._hulls)) & self.zone
+        hulls = _hulls(people) & self.zone
         self._learn(difference, apart, faint | hulls)
-        self._labels, self._hulls = self._labelled(hulls), hulls
+        self._labels, self._hulls = self._labelled(people, hulls), hulls
         return self._blended(hulls, self._labels)
 
     def _begin(self, difference: Values) -> None:
@@ -117,28 +119,36 @@ class SeamBand:
         self._ground += share[..., None] * (difference - self._ground)
         self._noise += np.where(taken > 0, np.float32(0), share) * (apart - self._noise)
 
-    def _labelled(self, hulls: Mask) -> Mask:
+    def _labelled(self, people: Mask, hulls: Mask) -> Mask:
         """Return the labels (h, w): 1 for the second camera, by the memory and by where each hull lies."""
         labels = self.second.copy()
-        count, numbers, boxes, _ = cv2.connectedComponentsWithStats(hulls, connectivity=4)
-        for number in range(1, count):
-            left, top, width, height, area = boxes[number].tolist()
-            here = slice(top, top + height), slice(left, left + width)
-            own = numbers[here] == number
-            before = own & (self._hulls[here] > 0)
-            better = self.second[here][own].mean()
+        for here, own in _parts(hulls):
+            labels[here][own] = self._label(here, own)
             edges = self.second[here][own & (self._edge[here] > 0)]
-            if edges.size and edges.min() == edges.max():
-                # What reaches beyond the band is shown there by the better camera.
-                label = edges[0]
-            elif better in (0, 1) and self._clearance[here][own].min() > CLEAR:
-                label = better
-            elif np.count_nonzero(before) > area / 8:
-                label = self._labels[here][before].mean() > 0.5
-            else:
-                label = better > 0.5
-            labels[here][own] = label
+            if edges.size and edges.min() != edges.max():
+                # A crowd from one side of the band to the other: each for himself, and between them as most are.
+                crowd = np.zeros_like(hulls)
+                crowd[here] = people[here] * own
+                each = np.zeros_like(hulls)
+                for there, one in _parts(crowd):
+                    each[there][one] = self._label(there, one)
+                labels[here][own] = 2 * np.count_nonzero(each) > np.count_nonzero(crowd)
+                labels[crowd > 0] = each[crowd > 0]
         return labels
+
+    def _label(self, here: tuple[slice, slice], own: NDArray[np.bool_]) -> int:
+        """Return 1 if the second camera shows what fills cells (h, w) of some rows and columns."""
+        second = self.second[here]
+        edges = second[own & (self._edge[here] > 0)]
+        if edges.size and edges.min() == edges.max():
+            # What reaches beyond the band is shown there by the better camera.
+            return int(edges[0])
+        better = second[own].mean()
+        if better in (0, 1) and self._clearance[here][own].min() > CLEAR:
+            return int(better)
+        before = own & (self._hulls[here] > 0)
+        remembers = np.count_nonzero(before) > np.count_nonzero(own) / 8
+        return int((self._labels[here][before].mean() if remembers else better) > 0.5)
 
     def _blended(self, hulls: Mask, labels: Mask) -> tuple[Values, Values]:
         size = 2 * (2 * MARGIN + 1,)
@@ -210,17 +220,31 @@ def _with_border(zone: NDArray[np.bool_]) -> tuple[tuple[int, int], tuple[int, i
     )
 
 
-def _hulls(faint: Mask, outright: Mask) -> Mask:
-    """Return the convex hulls (h, w) of what differs and its blurred border, each of what hangs together."""
+def _people(faint: Mask, outright: Mask) -> Mask:
+    """Return what differs and its blurred border (h, w), without specks."""
     grown = cv2.morphologyEx(cv2.dilate(faint, BESIDE), cv2.MORPH_CLOSE, BESIDE)
     _, numbers = cv2.connectedComponents(grown, connectivity=4)
     people = np.bincount(numbers[outright > 0], minlength=int(numbers.max()) + 1) > SPECK_CELLS
     people[0] = False
-    outlines, _ = cv2.findContours(people[numbers].astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
-    hulls = np.zeros_like(faint)
+    return people[numbers].astype(np.uint8)
+
+
+def _hulls(people: Mask) -> Mask:
+    """Return the convex hulls (h, w), each of what hangs together."""
+    outlines, _ = cv2.findContours(people, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
+    hulls = np.zeros_like(people)
     for outline in outlines:
         cv2.fillConvexPoly(hulls, cv2.convexHull(outline), 1)
     return hulls
+
+
+def _parts(mask: Mask) -> Iterator[tuple[tuple[slice, slice], NDArray[np.bool_]]]:
+    """Yield the rows and columns of each part of a mask that hangs together, and its cells in them."""
+    count, numbers, boxes, _ = cv2.connectedComponentsWithStats(mask, connectivity=4)
+    for number in range(1, count):
+        left, top, width, height, _ = boxes[number].tolist()
+        here = slice(top, top + height), slice(left, left + width)
+        yield here, numbers[here] == number
 
 
 def blend_shares(people: Values, second: Values, static: NDArray[np.float32]) -> NDArray[np.float32]:
