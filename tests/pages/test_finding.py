@@ -36,13 +36,17 @@ def test_a_venue_is_made_of_frames_by_three_clicks(stub, visit, files, name):
     expect(button).to_be_enabled()
     page.get_by_label("Stands on the side").first.select_option("near")
     page.get_by_label("Field of view").nth(1).fill("65")
+    page.locator('select[name="panorama"]').nth(1).select_option("stitched, cylindrical")
     button.click()
     page.wait_for_url("**/ui/jobs/*")
     expect(page.get_by_role("button", name="Create the venue")).to_be_enabled()
     assert stub.http.get(f"/venues/{name}").status_code == 404
     with stub.database() as connection:
         sought = stored_site(connection, page.url.rpartition("/")[2])
-    assert sought["cameras"] == [{"id": "left", "side": "near"}, {"id": "right", "field_of_view_deg": 65}]
+    assert sought["cameras"] == [
+        {"id": "left", "side": "near"},
+        {"id": "right", "panorama": "cylindrical", "field_of_view_deg": 65},
+    ]
     search = page.url
     page.get_by_role("button", name="Create the venue").click()
     expect(page.get_by_role("heading", name=f"Calibration of {name}")).to_be_visible()

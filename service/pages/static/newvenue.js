@@ -57,7 +57,8 @@ class Camera {
     const plan = planned.get(this.id);
     const view = number(this.field("view").value) ?? plan?.view;
     const side = this.field("side").value;
-    return {id: this.id, ...(plan ? {position: plan.position, position_radius_m: PLANNED_RADIUS_M} : {}), ...(side ? {side} : {}), ...(view === undefined ? {} : {field_of_view_deg: view})};
+    const panorama = this.field("panorama").value;
+    return {id: this.id, ...(plan ? {position: plan.position, position_radius_m: PLANNED_RADIUS_M} : {}), ...(side ? {side} : {}), ...(panorama ? {panorama} : {}), ...(view === undefined ? {} : {field_of_view_deg: view})};
   }
 }
 
