@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: setup demo test test-fast test-long generators coverage format check wheel release-dry-run docs bench bench-find bench-knocked bench-confidence bench-plan bench-check bench-real bench-cost bench-fields bench-segmentation bench-truth bench-service bench-faults bench-hostile bench-rate bench-seam-people bench-versions bench-video bench-follow bench-live bench-learned train lock clean
+.PHONY: setup demo test test-fast test-long generators charts coverage format check wheel release-dry-run docs bench bench-find bench-knocked bench-confidence bench-plan bench-check bench-fccb bench-real bench-cost bench-fields bench-segmentation bench-truth bench-service bench-faults bench-hostile bench-rate bench-versions bench-video bench-follow bench-live bench-seam-people bench-learned train lock clean
 
 # What runs, without what tests, checks and clips need on top: a third of the size. Compiled where it is first imported.
 $(VENV)/.runtime: docker/requirements.lock requirements.lock pyproject.toml
@@ -38,7 +38,7 @@ test-fast: setup
 		tests/fields tests/service tests/worker tests/openapi tests/test_architecture.py
 
 # What CI runs after `make test`: proofs of accuracy, second parameters, a year of a venue; CONTRIBUTING.md says which.
-test-long: setup generators
+test-long: setup generators charts
 	$(PYTEST) -m long $(TESTS)
 
 # Generators of clients, which `make test-long` tries the OpenAPI document with. They want an older typer than ESC.
@@ -47,6 +47,14 @@ generators: $(VENV)/.generators
 $(VENV)/.generators: tests/openapi/generators.lock
 	$(PYTHON) -m venv $(VENV)/generators
 	$(VENV)/generators/bin/pip install --quiet --disable-pip-version-check --require-hashes -r $<
+	touch $@
+
+# Helm and the schemas of Kubernetes, which `make test-long` tries the chart with.
+charts: $(VENV)/.charts
+
+$(VENV)/.charts: tests/charts.lock
+	$(PYTHON) -m venv $(VENV)/charts
+	$(VENV)/charts/bin/pip install --quiet --disable-pip-version-check --require-hashes -r $<
 	touch $@
 
 # Lines and branches that `make test` reaches, by rooms. By files, with the lines that nothing reaches: .venv/bin/coverage report
@@ -114,6 +122,11 @@ bench-plan: setup
 
 bench-check: setup
 	$(BENCH).check
+
+# The Fixed Camera Calibration Bench: benchmarks/fccb/README.md.
+bench-fccb: setup
+	$(BENCH).fccb make runs/fccb/public --seed 1
+	$(BENCH).fccb table runs/fccb/public
 
 # Needs GStreamer's RTSP server, as CONTRIBUTING.md says.
 bench-live: setup
@@ -183,6 +196,7 @@ lock:
 	uv pip compile --universal --python-version 3.11 --generate-hashes --extra exr --extra tracing --constraint requirements.lock \
 		-o docker/requirements.lock pyproject.toml
 	uv pip compile --universal --python-version 3.11 --generate-hashes --group generators -o tests/openapi/generators.lock
+	uv pip compile --universal --python-version 3.11 --generate-hashes --group charts -o tests/charts.lock
 	uv pip compile --universal --python-version 3.11 --generate-hashes --group release --constraint requirements.lock \
 		-o tools/requirements.lock
 

@@ -20,7 +20,6 @@ import argparse
 import time
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -31,7 +30,7 @@ from benchmarks.fields import real
 from benchmarks.fields.cases import Case, cases
 from benchmarks.fields.engine import THREADS, Answer, Engine
 from benchmarks.fields.judging import share
-from benchmarks.fields.rendered import GROUNDS, LEAST_SHOWN, random_camera, shot, usual_field
+from benchmarks.fields.rendered import GROUNDS, LEAST_SHOWN, overlapping_cameras, shot, usual_field
 from benchmarks.printing import print_sections, table_head
 from benchmarks.rows import Rows
 from benchmarks.scenes import FOLDER as RUNS
@@ -45,7 +44,6 @@ from service.schemas.find import SoughtCameraIn
 from worker.calibration.find_cameras import find_cameras
 from worker.calibration.geometry.camera import Camera, Frame, inside
 from worker.calibration.geometry.field import Field
-from worker.calibration.geometry.ground_view import ground_grid
 from worker.calibration.relocalisation.field_map import FieldMap
 from worker.calibration.relocalisation.relocalise import mean_shift_px, twin
 from worker.calibration.relocalisation.sought import SoughtCamera, SoughtLens
@@ -60,8 +58,6 @@ BENT_DEG, ALIKE_DEG, FEWEST_POINTS = 30.0, 5.0, 6
 """A marking in view is an arc if it turns by so much at least; straight ones have one direction within so much."""
 NEAR = 0.0026
 """Found: the markings in view lie, on mean, within this part of the frame's width of where they are (5 px of 1920)."""
-LEAST_SHARED, MOST_SHARED = 0.2, 0.8
-"""So much of the ground that one of a pair sees, which sees less of it, the other one sees too."""
 ALIKE = 0.001
 """Two jobs end alike that put the markings in view apart by no more than this part of the frame's width."""
 
@@ -186,7 +182,7 @@ def _found_beside(name: str, number: int, engine: Engine) -> dict:
     """A camera that is sought, through its own lens, beside a known one that sees some of the same ground."""
     rng = np.random.default_rng([zlib.crc32(name.encode()), number, 9])
     pitch = usual_field(name)
-    known, truth = _overlapping(pitch, rng)
+    known, truth = overlapping_cameras(pitch, rng)
     conditions = seen_well(Conditions.random(rng))
     frames = {one.id: [render_frame(pitch, one, conditions, rng).frame] for one in (known, truth)}
     found = find_cameras(pitch, [_sought(truth, "lens", rng)], [known], frames, engine.segment, number)
@@ -200,16 +196,6 @@ def _found_beside(name: str, number: int, engine: Engine) -> dict:
         twin(best).pose.position - truth.pose.position
     )
     return row | {"near": bool(off <= NEAR * truth.intrinsics.size[0]), "on_its_side": bool(is_nearer)}
-
-
-def _overlapping(pitch: Field, rng: np.random.Generator) -> list[Camera]:
-    """Two cameras anywhere around a field; of what one of them sees of the ground, the other sees part."""
-    places = pitch.lift(ground_grid(50, 50, max(pitch.length, pitch.width) / 100))
-    while True:
-        cameras = [replace(random_camera(rng, pitch), id=name) for name in ("known", "sought")]
-        one, other = (inside(camera.project(places), camera.intrinsics.size) for camera in cameras)
-        if LEAST_SHARED < np.count_nonzero(one & other) / min(map(np.count_nonzero, (one, other))) < MOST_SHARED:
-            return cameras
 
 
 def _found_in_case(case: Case, knowing: str, engine: Engine) -> dict:

@@ -25,7 +25,7 @@ from service.settings import Settings
 from testbed.running import children, ready, wait_for
 
 DEMO = Path(__file__).parents[1] / "demo"
-FLEETS = (100, 10_000, 1_000_000)
+FLEETS = (100, 10_000)
 JOBS_MEASURED = 3
 
 

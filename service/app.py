@@ -20,7 +20,7 @@ from service.api.request_log import RequestLog, is_quiet
 from service.api.root_path import RootPath
 from service.pages import FOR_BROWSERS, show_browsers_what_is_missing
 from service.pages import ROUTERS as PAGES
-from service.routes import docs, event_streams, health, jobs, live, pictures, plan, snapshot, stitch, venues
+from service.routes import docs, event_streams, health, jobs, keys, live, pictures, plan, snapshot, stitch, venues
 from service.routes.contract import document
 from service.routes.contract.introduction import DESCRIPTION, TAGS
 from service.routes.contract.problem_docs import OF_ANY_ROUTE
@@ -87,6 +87,7 @@ def all_routes() -> Sequence[BaseRoute]:
         jobs,
         resubmit,
         pictures,
+        keys,
         health,
         docs,
     ):

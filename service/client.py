@@ -40,6 +40,7 @@ from service.schemas.find import SoughtSite
 from service.schemas.health import VenueHealth
 from service.schemas.history import History, Revision
 from service.schemas.job import Job, Jobs
+from service.schemas.keys import ApiKey, ApiKeys, KeyIn, MadeKey
 from service.schemas.live import LiveHistory, LiveReport, LiveState
 from service.schemas.merge_patch import MEDIA_TYPE as MERGE_PATCH
 from service.schemas.names import (
@@ -392,6 +393,20 @@ class AsyncClient:
                 await self._pause(pause_s_of(error, every_s))
         return followed
 
+    # Keys
+
+    async def keys(self) -> list[ApiKey]:
+        """Return all API keys, without the keys themselves."""
+        return (await self._call(ApiKeys, "GET", "/keys")).keys
+
+    async def add_key(self, wanted: KeyIn) -> MadeKey:
+        """Make an API key; its secret is in this answer alone."""
+        return await self._call(MadeKey, "POST", "/keys", json=wanted.model_dump(mode="json", exclude_defaults=True))
+
+    async def revoke_key(self, name: str) -> None:
+        """Revoke an API key."""
+        await self._ask("DELETE", f"/keys/{name}")
+
     # Requests
 
     async def _call(self, model: type[Answer], method: str, path: str, **more: Any) -> Answer:
@@ -504,6 +519,9 @@ class Client:
     job_poses = blocking(AsyncClient.job_poses)
     picture = blocking(AsyncClient.picture)
     follow = blocking(AsyncClient.follow)
+    keys = blocking(AsyncClient.keys)
+    add_key = blocking(AsyncClient.add_key)
+    revoke_key = blocking(AsyncClient.revoke_key)
 
 
 def _connection(url: str, api_key: str | None) -> dict[str, Any]:

@@ -5,7 +5,17 @@ from difflib import get_close_matches
 
 PREFIX = "ESC_"
 # Read by commands of the client.
-OF_CLIENTS = frozenset({"ESC_URL", "ESC_API_KEY", "ESC_API_KEY_FILE"})
+OF_CLIENTS = frozenset(
+    {
+        "ESC_URL",
+        "ESC_API_KEY",
+        "ESC_API_KEY_FILE",
+        "ESC_MQTT_BROKER",
+        "ESC_MQTT_PASSWORD",
+        "ESC_MQTT_PASSWORD_FILE",
+        "ESC_MCP_ALLOW_STORING",
+    }
+)
 # Read by docker/compose.yaml and docker/systemd/esc-live@.service, and by child processes.
 OF_OTHERS = frozenset({"ESC_DATABASE_PASSWORD", "ESC_LIVE", "ESC_PARENT"})
 OF_TESTS = "ESC_TEST_"

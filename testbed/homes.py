@@ -177,6 +177,8 @@ class Servers:
     def bucket_away(self) -> Iterator[None]:
         """It takes requests and does not answer them."""
         self._bucket.server.send_signal(signal.SIGSTOP)
+        # Its threads go on until one of them has come to run and has seen the signal.
+        os.waitid(os.P_PID, self._bucket.server.pid, os.WSTOPPED)
         try:
             yield
         finally:

@@ -68,7 +68,7 @@ def main() -> None:
     # Other venues are called whatever their owners like.
     end = time.monotonic() + (float(seconds) if seconds.replace(".", "").isdigit() else 0)
     # A test that needs the program to run until something else has happened lets a file lie there so long.
-    hold = Path(given["means"]["model"]).with_name("hold")
+    hold = Path(given["means"]["model"]).with_name(f"hold {about and about['id']}")
     while time.monotonic() < end or hold.exists():
         time.sleep(0.05)
         say(progress={"stage": "evolution", "fraction": 0.5, "generation": 7, "loss": 0.3})

@@ -49,6 +49,7 @@ def spoiled_ways() -> dict[str, Spoiled]:
             frozenset({"other-resolution"}),
             _lens_halved,
         ),
+        "coefficients in another order": Spoiled("wrong", frozenset({"distortion-order"}), _reordered),
         "folding": Spoiled("wrong", frozenset({"folds"}), _folding),
     }
     for name, axes in {"y up": Y_UP, "x and y exchanged": X_ACROSS, "z down": Z_DOWN}.items():
@@ -89,6 +90,12 @@ def _halved(one: CheckedCamera, half: np.ndarray) -> CheckedCamera:
 
 def _lens_halved(one: CheckedCamera, half: np.ndarray) -> CheckedCamera:
     return one.model_copy(update={"intrinsics": _halved(one, half).intrinsics})
+
+
+def _reordered(one: CheckedCamera, half: np.ndarray) -> CheckedCamera:
+    """k1, k2, k3, p1, p2 where k1, k2, p1, p2, k3 are meant, as some tools have them."""
+    k1, k2, p1, p2, k3 = [*one.intrinsics.distortion, *[0.0] * 5][:5]
+    return one.model_copy(update={"intrinsics": one.intrinsics.model_copy(update={"distortion": [k1, k2, k3, p1, p2]})})
 
 
 def _folding(one: CheckedCamera, half: np.ndarray) -> CheckedCamera:

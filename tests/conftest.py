@@ -56,7 +56,9 @@ PARTS = {
     "released": "fetch the whole history, which the last release is built from (git fetch --unshallow)",
     "gstreamer": "install GStreamer's RTSP server (Debian: apt-get install python3-gi gir1.2-gst-rtsp-server-1.0 "
     "gstreamer1.0-plugins-good gstreamer1.0-plugins-bad)",
+    "mosquitto": "install Mosquitto (Debian: apt-get install mosquitto)",
     "ffmpeg": "install FFmpeg (Debian: apt-get install ffmpeg)",
+    "helm": "install Helm's library and the schemas of Kubernetes (make charts)",
     "generators": "install generators of clients (make generators)",
 }
 
@@ -115,7 +117,7 @@ def dealt(items, processes):
     for item in items:
         if item.get_closest_marker("servers"):
             on_servers.append(item)
-        elif item.get_closest_marker("first") or item.get_closest_marker("long"):
+        elif item.get_closest_marker("long"):
             longest.append(item)
         elif item.nodeid.startswith(WHOLE_SERVICE):
             waiting.append(item)

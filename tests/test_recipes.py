@@ -75,6 +75,7 @@ def test_maps_take_the_place_of_the_stitcher_of_opencv(tmp_path):
     assert np.median(cv2.absdiff(made, expected)) <= 1
 
 
+@pytest.mark.long
 def test_colmap_triangulates_points_of_the_ground_with_our_poses(tmp_path, missing):
     try:
         import pycolmap

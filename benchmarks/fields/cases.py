@@ -14,7 +14,7 @@ import numpy as np
 from service.schemas.field import FieldOfPlay
 from worker.calibration.geometry.camera import Camera, Frame, Pose
 from worker.calibration.geometry.field import Field
-from worker.calibration.geometry.lens import LENSES
+from worker.calibration.geometry.lens_models import LENSES
 from worker.calibration.geometry.rotation import rotation_matrices, rotation_vectors
 from worker.jobs.from_schemas import pitch_of
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import zlib
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cv2
@@ -21,6 +21,7 @@ from models.training.courts.court import render_court
 from models.training.courts.floors import Floor, clay, concrete, grass, hard_court, ice, random_floor, sand, wood
 from worker.calibration.geometry.camera import Camera, Frame, Pose, inside
 from worker.calibration.geometry.field import Field
+from worker.calibration.geometry.ground_view import ground_grid
 from worker.calibration.geometry.lens import Intrinsics
 from worker.calibration.geometry.rotation import rotation_matrices, rotation_vectors
 from worker.calibration.geometry.visibility import VisibleLines
@@ -35,6 +36,8 @@ NOISE_PX, LARGEST_SIGMA_M = 0.3, 0.01
 LARGEST_CONDITION = 1e10
 LEAST_SHOWN = 0.6
 """Of the lines in view that a picture shows: in one that shows less nobody is blamed for not finding them."""
+LEAST_SHARED, MOST_SHARED = 0.2, 0.8
+"""So much of the ground that one of a pair sees, which sees less of it, the other one sees too."""
 GROUNDS: dict[str, Sequence[Floor]] = {
     "american-football": (grass,),
     "basketball": (wood, hard_court, concrete),
@@ -146,9 +149,13 @@ def shot(name: str, number: int) -> Shot:
     """View `number` of a template: of even numbers on a ground of the sport's, of odd ones on any."""
     rng = np.random.default_rng([zlib.crc32(name.encode()), number])
     pitch = usual_field(name)
-    camera = random_camera(rng, pitch)
+    return take_shot(name, pitch, random_camera(rng, pitch), rng, is_usual_floor=number % 2 == 0)
+
+
+def take_shot(name: str, pitch: Field, camera: Camera, rng: np.random.Generator, *, is_usual_floor: bool) -> Shot:
+    """Render what a camera sees of a template's field, on a ground that is usual for it, or on any."""
     fit = GROUNDS[name]
-    floor = fit[rng.integers(len(fit))] if number % 2 == 0 else random_floor
+    floor = fit[rng.integers(len(fit))] if is_usual_floor else random_floor
     court = render_court(pitch, camera, rng, floor)
     return Shot(pitch, camera, court.frame, floor.__name__, _shown(pitch, camera, court.target))
 
@@ -187,6 +194,16 @@ def random_camera(rng: np.random.Generator, pitch: Field) -> Camera:
         in_view = inside(camera.project(part), camera.intrinsics.size).mean()
         if in_view >= LEAST_IN_VIEW and _position_sigma(pitch, camera) <= LARGEST_SIGMA_M:
             return camera
+
+
+def overlapping_cameras(pitch: Field, rng: np.random.Generator) -> list[Camera]:
+    """Two cameras anywhere around a field; of what one of them sees of the ground, the other sees part."""
+    places = pitch.lift(ground_grid(50, 50, max(pitch.length, pitch.width) / 100))
+    while True:
+        cameras = [replace(random_camera(rng, pitch), id=name) for name in ("known", "sought")]
+        one, other = (inside(camera.project(places), camera.intrinsics.size) for camera in cameras)
+        if LEAST_SHARED < np.count_nonzero(one & other) / min(map(np.count_nonzero, (one, other))) < MOST_SHARED:
+            return cameras
 
 
 def _position_sigma(pitch: Field, camera: Camera) -> float:

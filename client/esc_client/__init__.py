@@ -19,6 +19,7 @@ from service.schemas.geometry import Intrinsics, Pose, PoseIn
 from service.schemas.health import Alarm, AlarmEvent, Alarms, VenueHealth
 from service.schemas.history import Revision
 from service.schemas.job import Job, JobEvent, Progress
+from service.schemas.keys import ApiKey, KeyIn, MadeKey
 from service.schemas.live import LiveHistory, LiveReport, LiveState
 from service.schemas.options import Options
 from service.schemas.plan import PlanAnswer, PlannedCameraIn, PlannedSite
@@ -33,6 +34,7 @@ __all__ = [
     "Alarm",
     "AlarmEvent",
     "Alarms",
+    "ApiKey",
     "AsyncClient",
     "Camera",
     "CameraIn",
@@ -45,9 +47,11 @@ __all__ = [
     "Intrinsics",
     "Job",
     "JobEvent",
+    "KeyIn",
     "LiveHistory",
     "LiveReport",
     "LiveState",
+    "MadeKey",
     "NotUnderstood",
     "Options",
     "PlanAnswer",

@@ -27,7 +27,7 @@ from models.training.pitches.surface import ground_patch, marking_distance, mark
 from worker.calibration.detection.segmentation import Segmenter, whole_frame
 from worker.calibration.geometry.camera import Camera, Pose
 from worker.calibration.geometry.field import Field
-from worker.calibration.geometry.lens import LENSES
+from worker.calibration.geometry.lens_models import LENSES
 
 TOLERANCE_PX = 3
 AROUND_PITCH_M = 5.0

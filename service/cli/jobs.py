@@ -1,5 +1,7 @@
 """`esc job`: jobs of a service."""
 
+import json
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -18,12 +20,14 @@ from service.cli.arguments import (
     Output,
     Url,
     Yes,
+    check_job_id,
     require_yes,
 )
-from service.cli.printing import FAILED, fail, print_rows, write_document
+from service.cli.printing import FAILED, USAGE, fail, print_rows, write_document
 from service.cli.progress import end_with_job
 from service.cli.service_client import open_client
-from service.schemas.job import Jobs
+from service.client import Client, Refused
+from service.schemas.job import Jobs, newest_failed
 from service.schemas.names import JobKind, JobStatus
 from service.store.jobs.files import picture_file
 
@@ -31,6 +35,10 @@ app = typer.Typer(
     no_args_is_help=True, help="Jobs of a running service: calibrations, and what comes before the first."
 )
 NOT_PICTURES = {"self", "events", "cancel", "venue"}
+
+
+def _check_job_ids(jobs: list[str] | None) -> list[str]:
+    return [job for job in jobs or () if check_job_id(job)]
 
 
 @app.command("list")
@@ -72,7 +80,14 @@ def wait_for_job(job: JobId, as_json: AnswerAsJson = False, url: Url = DEFAULT_U
 
 @app.command("again")
 def submit_again(
-    job: JobId,
+    jobs: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[JOB...]", callback=_check_job_ids, help="Ids of jobs, as `esc job list` prints them."),
+    ] = None,
+    failed: Annotated[
+        bool, typer.Option("--failed", help="Of each venue the newest job that failed and whose frames are kept.")
+    ] = False,
+    venue: Annotated[str | None, typer.Option("--venue", metavar="VENUE", help="With --failed: of one venue.")] = None,
     wait: Annotated[
         bool, typer.Option("--wait", help="Follow the new job to its end, as `esc job wait` does.")
     ] = False,
@@ -80,9 +95,34 @@ def submit_again(
     url: Url = DEFAULT_URL,
     api_key: ApiKey = None,
 ) -> None:
-    """Compute the frames of a job once more, with its options, from the poses in use: a new job."""
+    """Compute the frames of a job once more, with its options, from the poses in use: a new job.
+
+    Of several jobs a line each: its id, the new job's, or why there is none. Exit: 1 if one was refused.
+    """
+    if bool(jobs) == failed or (venue and not failed) or (wait and (failed or len(jobs or ()) > 1)):
+        fail("Name jobs, or --failed with or without --venue; --wait is for one job", USAGE)
     with open_client(url, api_key) as client:
-        end_with_job(client, client.again(job), wait=wait, as_json=as_json)
+        if jobs and len(jobs) == 1:
+            end_with_job(client, client.again(jobs[0]), wait=wait, as_json=as_json)
+            return
+        ids = jobs or newest_failed(client.jobs(venue, "failed"))
+        rows = [_submit_one_again(client, job_id) for job_id in ids]
+    if as_json or not sys.stdout.isatty():
+        print(
+            json.dumps([{"job": job_id, "again": again, "why": why or None} for job_id, again, why in rows], indent=2)
+        )
+    else:
+        print_rows(["JOB", "AGAIN", "WHY NOT"], [(job_id, again or "-", why) for job_id, again, why in rows])
+    if any(again is None for _, again, _ in rows):
+        raise typer.Exit(FAILED)
+
+
+def _submit_one_again(client: Client, job_id: str) -> tuple[str, str | None, str]:
+    """Return the id of a job, that of the new job, and why there is none."""
+    try:
+        return job_id, client.again(job_id).id, ""
+    except Refused as refused:
+        return job_id, None, str(refused)
 
 
 @app.command("picture")

@@ -31,6 +31,8 @@ COMMANDS = {
     "convert": ("convert:convert", "Convert a calibration to the format of another tool."),
     "stitch": ("stitch:stitch", "Stitch clips into one, on this machine."),
     "live": ("live:live", "Send the poses of a venue to renderers until stopped, by OpenTrackIO and FreeD over UDP."),
+    "mqtt": ("mqtt:mqtt", "Publish venues to an MQTT broker until stopped: each is a device of Home Assistant."),
+    "mcp": ("mcp:mcp", "Serve assistants by the Model Context Protocol: they read venues and propose calibrations."),
     "venue": ("venues:app", "Venues: pitch, cameras, stored poses."),
     "field": ("onboarding:field_app", "The pitch of a venue: fit its length, width and ridge."),
     "job": ("jobs:app", "Jobs of a running service: calibrations, and what comes before the first."),

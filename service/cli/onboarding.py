@@ -36,7 +36,7 @@ from service.cli.progress import follow_to_end
 from service.cli.service_client import open_client
 from service.intake import image_checks
 from service.schemas.geometry import LensFile, Pose, PoseIn
-from service.schemas.names import ID_PATTERN, LensModel
+from service.schemas.names import ID_PATTERN, BoardLensModel
 from service.schemas.options import ClickedPoints, FieldOptions, IntrinsicsOptions
 from service.schemas.results import FieldResult
 from service.schemas.venue import CameraIn, Site, Venue, VenueIn
@@ -94,7 +94,7 @@ def intrinsics(
         ),
     ] = None,
     model: Annotated[
-        LensModel, typer.Option("--model", help="Lens model: opencv, or fisheye (Kannala-Brandt) for wide ones.")
+        BoardLensModel, typer.Option("--model", help="Lens model: opencv, or fisheye (Kannala-Brandt) for wide ones.")
     ] = "opencv",
     picture: Annotated[
         Path | None, typer.Option("--picture", help="JPEG file to draw into where in the frame the board was seen.")
@@ -265,7 +265,7 @@ def _fit_by_service(
     return stored, job.result, {name: picture for name, picture in drawn.items() if picture is not None}
 
 
-def _parse_lens_options(board: str, square: float, charuco: str | None, model: LensModel) -> IntrinsicsOptions:
+def _parse_lens_options(board: str, square: float, charuco: str | None, model: BoardLensModel) -> IntrinsicsOptions:
     counted = re.fullmatch(r"(\d+)[x×](\d+)", board)
     if counted is None:
         fail(f"{board!r} is not COLUMNSxROWS, for instance 9x6", USAGE)

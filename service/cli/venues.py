@@ -40,6 +40,7 @@ from service.cli.venue_reports import follow_venue, venue_health, venue_history,
 from service.client import Client, Refused
 from service.schemas.field import FieldOfPlay
 from service.schemas.names import StitchFormat, id_like
+from service.schemas.problems import Problem
 from service.schemas.venue import Venue, VenueIn
 
 WAYS_TO_PUT = (
@@ -98,11 +99,10 @@ def put_venue(
 def _venue_of_calibration(file: Path, field: FieldOfPlay, id: str) -> VenueIn:
     """Return a venue with the cameras of a calibration, or exit with what it lacks."""
     found = read_calibration([file])
-    for camera in found.cameras:
-        if camera.pose is None or camera.size is None:
-            lacking = "pose" if camera.pose is None else "picture size"
-            fail(f"{file}, camera {camera.id}: expected a {lacking}, got none; esc venue find needs none", USAGE)
-    cameras = [one.to_check.model_dump(mode="json") for one in found.cameras]
+    try:
+        cameras = [one.model_dump(mode="json") for one in found.cameras_of_venue()]
+    except Problem as problem:
+        fail(f"{file}: {problem.detail}", USAGE)
     document = {"id": id, "field": field.model_dump(mode="json"), "cameras": cameras}
     return parse_document(VenueIn, json.dumps(document), str(file))
 

@@ -7,6 +7,8 @@ models are read but those without a counterpart (FOV, THIN_PRISM_FISHEYE and new
 
 import struct
 from collections.abc import Callable, Iterator, Sequence
+from pathlib import PurePath
+from typing import Any
 
 from service.formats.archive import archive
 from service.formats.lens import RADIAL, TANGENTIAL, NumberedCamera
@@ -79,9 +81,10 @@ def _line(*words: str | float) -> str:
 
 
 def recognises(file: ParsedFile) -> bool:
-    """True for lines of cameras or images, and for bytes that are cameras or images to their end."""
+    """True for lines of cameras or images, and for bytes that are cameras or images to their end, or are named so."""
     if file.kind == "binary":
-        return any(_ends_well(parse, file) for parse in (_binary_cameras, _binary_images))
+        named = PurePath(file.name).name in ("cameras.bin", "images.bin")
+        return named or any(_ends_well(parse, file) for parse in (_binary_cameras, _binary_images))
     return file.kind == "colmap"
 
 
@@ -91,7 +94,7 @@ def read(files: Sequence[ParsedFile]) -> list[CameraRecord]:
     images: list[tuple[Node, list[float], int, str]] = []
     for file in files:
         if file.kind == "binary":
-            is_cameras = _ends_well(_binary_cameras, file)
+            is_cameras = PurePath(file.name).name == "cameras.bin" or _ends_well(_binary_cameras, file)
             lenses |= dict(_binary_cameras(file)) if is_cameras else {}
             images += [] if is_cameras else _binary_images(file)
         elif _is_cameras(file):
@@ -186,21 +189,31 @@ def _ends_well(parse: Callable[[ParsedFile], Iterator[object]], file: ParsedFile
     """True if bytes are what a parser reads, up to their end."""
     try:
         return bool(list(parse(file)))
-    except (FileRefusedError, struct.error, UnicodeDecodeError):
+    except FileRefusedError:
         return False
+
+
+def _unpack(file: ParsedFile, form: str, at: int) -> tuple[Any, ...]:
+    """Return the values at a byte; refuse a file that ends before."""
+    try:
+        return struct.unpack_from(form, file.content, at)
+    except struct.error:
+        raise FileRefusedError(
+            file.name, f"byte {at}", "more bytes: the file is cut off or damaged", f"{len(file.content)} in all"
+        ) from None
 
 
 def _binary_cameras(file: ParsedFile) -> Iterator[tuple[int, tuple[Intrinsics, tuple[int, int]]]]:
     """Yield the cameras of cameras.bin: id, number of the model, width, height, parameters; little-endian."""
     by_number = {number: (name, parts) for name, (number, parts) in MODELS.items()}
-    (count,) = struct.unpack_from("<Q", file.content)
+    (count,) = _unpack(file, "<Q", 0)
     at = 8
     for _ in range(count):
         node = Node(file.name, f"byte {at}", None)
-        camera, model, width, height = struct.unpack_from("<iiQQ", file.content, at)
+        camera, model, width, height = _unpack(file, "<iiQQ", at)
         name, parts = by_number.get(model, (f"number {model}", None))
         length = len(parts or ())
-        parameters = struct.unpack_from(f"<{length}d", file.content, at + 24)
+        parameters = _unpack(file, f"<{length}d", at + 24)
         yield camera, (_lens(node, name, parameters), (width, height))
         at += 24 + 8 * length
     _require_end(file, at)
@@ -208,17 +221,17 @@ def _binary_cameras(file: ParsedFile) -> Iterator[tuple[int, tuple[Intrinsics, t
 
 def _binary_images(file: ParsedFile) -> Iterator[tuple[Node, list[float], int, str]]:
     """Yield the images of images.bin: id, quaternion, translation, camera, name that ends with 0, points."""
-    (count,) = struct.unpack_from("<Q", file.content)
+    (count,) = _unpack(file, "<Q", 0)
     at = 8
     for _ in range(count):
         node = Node(file.name, f"byte {at}", None)
-        _, *numbers, camera = struct.unpack_from("<i7di", file.content, at)
+        _, *numbers, camera = _unpack(file, "<i7di", at)
         at += 64
         end = file.content.find(b"\0", at)
         if end < 0:
             node.refuse("a name that ends")
-        name = file.content[at:end].decode()
-        (points,) = struct.unpack_from("<Q", file.content, end + 1)
+        name = file.content[at:end].decode(errors="replace")
+        (points,) = _unpack(file, "<Q", end + 1)
         yield node, numbers, camera, name
         at = end + 9 + POINT2D_BYTES * points
     _require_end(file, at)

@@ -92,12 +92,14 @@ class NumberedCamera:
 
     def require_support(self, name: str, supported: Collection[str]) -> None:
         """Refuse a lens with skew or coefficients that are not `supported`: without them points are pixels off."""
-        if self.is_fisheye:
+        model = self.camera.intrinsics.model
+        if model != "opencv":
+            kind = "fisheye lens" if self.is_fisheye else f"{model} panorama"
             raise Problem(
                 "format-cannot-hold",
-                f"{name} has no place for the fisheye lens of camera {self.id}; json and st-map hold every lens.",
+                f"{name} has no place for the {kind} of camera {self.id}; json and st-map hold every lens.",
                 camera=self.id,
-                got=["fisheye"],
+                got=[model],
             )
         beyond = [key for key, value in self.coefficients.items() if value != 0 and key not in supported]
         if self.camera.intrinsics.matrix[0][1] != 0:

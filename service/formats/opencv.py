@@ -5,6 +5,7 @@ XML and JSON, under the names that OpenCV's own samples and most of its users gi
 `fisheye_model: 1`, as the samples write it. `rvec` and `tvec` (or a matrix R and T) take the world to the camera.
 """
 
+import math
 from collections.abc import Sequence
 
 from service.formats.lens import COEFFICIENTS, NumberedCamera
@@ -98,6 +99,8 @@ def _data(node: Node) -> Node:
     """Return the numbers of a matrix, row by row; they are a plain list where the file has no matrix."""
     if not isinstance(node.value, dict):
         return node
-    rows, columns, data = node["rows"].integer(1), node["cols"].integer(1), node["data"]
-    data.numbers(rows * columns)
+    # OpenCV 5 writes a vector with `sizes`, not as a column.
+    sides = node["sizes"].elements() if "sizes" in node else [node["rows"], node["cols"]]
+    data = node["data"]
+    data.numbers(math.prod(side.integer(1) for side in sides))
     return data

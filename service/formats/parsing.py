@@ -129,7 +129,7 @@ def _parse_yaml(text: str) -> Any:
                 stack.pop()
                 keys.pop()
     if len(root) != 1:
-        raise ValueError(f"{len(root)} documents")
+        raise ValueError(f"{len(root)} documents" if root else "nothing but comments")
     return root[0]
 
 

@@ -13,7 +13,7 @@ from service.formats.lens import NumberedCamera
 from service.formats.nodes import FileRefusedError, Node
 from service.formats.parsing import ParsedFile
 from service.formats.records import CameraRecord, stem_of
-from service.formats.rotations import pose_from_translation
+from service.formats.rotations import pose_from_translation, read_vector
 from service.schemas.base import TOLERANTLY
 from service.schemas.findings import describe_errors
 from service.schemas.geometry import Intrinsics, Pose
@@ -61,7 +61,7 @@ def _lens(node: Node) -> Intrinsics:
 
 
 def _pose(node: Node) -> Pose:
-    rotation = node["rotation"].numbers(3)
+    rotation = read_vector(node["rotation"])
     if "translation" not in node:
         return Pose.from_position(rotation, node["position"].numbers(3))
     pose = pose_from_translation(rotation, node["translation"].numbers(3))

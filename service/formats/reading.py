@@ -3,13 +3,14 @@
 import io
 import zipfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from service.formats.nodes import FileRefusedError
 from service.formats.parsing import MOST_BYTES, MOST_BYTES_OF_COLMAP, ParsedFile, parse_file
 from service.formats.records import CameraRecord, with_distinct_ids
 from service.formats.table import FILE_FORMATS
+from service.schemas.check import CheckedCamera
 from service.schemas.names import FormatName, id_like
 from service.schemas.problems import Problem
 
@@ -30,10 +31,11 @@ SUFFIXES = {
 
 @dataclass(frozen=True)
 class CalibrationFile:
-    """The cameras of one or more files of one format."""
+    """The cameras of one or more files of one format; `not_read`: why others beside them were passed over."""
 
     format: FormatName
     cameras: list[CameraRecord]
+    not_read: list[str] = field(default_factory=list)
 
     def with_frames(self, names: Sequence[str]) -> list[CameraRecord]:
         """Return the cameras of these names; the only camera of a file has any one name.
@@ -48,11 +50,23 @@ class CalibrationFile:
                 raise Problem(
                     "unknown-camera",
                     f"The calibration has the cameras {', '.join(known)} and no {name[:64]!r}; name each frame by its "
-                    "camera.",
+                    f"camera.{''.join(f' Not read: {why}.' for why in self.not_read)}",
                     camera=name[:64],
                     expected=known,
                 )
         return [one for one in self.cameras if one.id in names]
+
+    def cameras_of_venue(self) -> list[CheckedCamera]:
+        """Return the cameras as a venue takes them. Raises the problem `calibration-refused` for what one lacks."""
+        for one in self.cameras:
+            if one.pose is None or one.size is None:
+                raise Problem(
+                    "calibration-refused",
+                    f"Camera {one.id} of the calibration: expected a {'pose' if one.pose is None else 'picture size'}, "
+                    "got none. A search (`esc venue find`) needs none.",
+                    camera=one.id,
+                )
+        return [one.to_check for one in self.cameras]
 
 
 def read_paths(paths: list[Path]) -> CalibrationFile:
@@ -109,7 +123,7 @@ def read_files(files: Mapping[str, bytes], optional: frozenset[str] = frozenset(
     cameras = with_distinct_ids(reader.read(of_form))
     if not cameras:
         raise FileRefusedError(of_form[0].name, "", "at least one camera", "none")
-    return CalibrationFile(form, cameras)
+    return CalibrationFile(form, cameras, [str(refusal) for refusal in refusals])
 
 
 def _format_of(file: ParsedFile) -> FormatName:

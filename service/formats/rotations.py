@@ -66,9 +66,17 @@ def read_rotation(node: Node) -> list[float]:
     """Return the Rodrigues vector of a file's rotation, a vector or a matrix; refuse what turns nothing."""
     if isinstance(node.value, list) and len(node.value) == 3 and isinstance(node.value[0], list):
         if len(node.value[0]) == 1:
-            return node.numbers(3)
+            return read_vector(node)
         return rotation_of(node, node.matrix(3, 3))
-    return rotation_of(node, node.matrix(3, 3)) if len(node.numbers(3, 9)) == 9 else node.numbers(3)
+    return rotation_of(node, node.matrix(3, 3)) if len(node.numbers(3, 9)) == 9 else read_vector(node)
+
+
+def read_vector(node: Node) -> list[float]:
+    """Return a Rodrigues vector in radians; refuse one of more than a turn, which tools write in degrees alone."""
+    vector = node.numbers(3)
+    if math.hypot(*vector) > 2 * math.pi:
+        node.refuse("a rotation vector in radians, shorter than a turn (this one seems to be in degrees)")
+    return vector
 
 
 def rotation_of(node: Node, matrix: Matrix) -> list[float]:

@@ -11,7 +11,7 @@ from service.pages.venues import sizes_of
 from service.routes.contract.attribution import hide_other_asker
 from service.routes.contract.documented import needs_scope
 from service.routes.contract.restricted import OnlyVenues, lists_by_venue
-from service.schemas.job import Job
+from service.schemas.job import Job, newest_failed
 from service.schemas.names import ID_PATTERN, JOB_ID_PATTERN, FormatName, JobKind, JobStatus
 from service.schemas.problems import Problem
 from service.store.jobs.queries import JobPage
@@ -43,6 +43,7 @@ def jobs(
         "jobs.html",
         jobs=[hide_other_asker(one) for one in found.jobs],
         unreadable=found.unreadable,
+        failed=newest_failed(found.jobs) if status == "failed" else [],
         chosen={"venue": venue, "status": status, "kind": kind},
         statuses=get_args(JobStatus),
         kinds=get_args(JobKind),

@@ -4,6 +4,7 @@ import math
 from typing import Annotated, Any, get_args
 
 from fastapi import APIRouter, Query, Request, Response
+from starlette.concurrency import run_in_threadpool
 
 from fields.shapes import Arc, Line, Point, Shape
 from fields.template import NAMES
@@ -11,6 +12,9 @@ from service.api.context import Context, InContext
 from service.pages.page_rendering import Page, render_page
 from service.routes.contract.documented import needs_scope
 from service.routes.contract.guarded import Guarded
+from service.routes.submissions.check import MOST_CALIBRATION_FILES, read_calibration
+from service.routes.submissions.forms import parsed_upload
+from service.routes.submissions.job_submission import FromSender
 from service.schemas.field import FieldOfPlay
 from service.schemas.names import ID_PATTERN, LensModel
 from service.schemas.programs.clicked_pose import ClickedPose, ClickedPoseRequest
@@ -69,6 +73,15 @@ def plan(field: FieldOfPlay) -> dict[str, Any]:
         "lines": [_polyline(shape) for shape in field.markings],
         "points": field.plan.places(field.size),
     }
+
+
+@data.post("/calibration", openapi_extra=needs_scope("admin"))
+async def calibration(request: Request, context: InContext, sender: FromSender) -> dict[str, Any]:
+    """Answer the cameras of a calibration of any tool, as a venue takes them, and which of its files were not read."""
+    async with parsed_upload(request, context, None, "calibration", sender, MOST_CALIBRATION_FILES) as form:
+        found = await run_in_threadpool(read_calibration, context, form)
+    cameras = [one.model_dump(mode="json") for one in found.cameras_of_venue()]
+    return {"format": found.format, "cameras": cameras, "not_read": found.not_read}
 
 
 @data.post("/pose", openapi_extra=needs_scope("calibrate"))

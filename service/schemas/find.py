@@ -8,10 +8,12 @@ from pydantic import Field, model_validator
 from service.schemas.addresses import SourceUrl
 from service.schemas.base import OPEN_WORD, Id, Number, Schema
 from service.schemas.geometry import Intrinsics, PoseIn, Position, Side, require_camera_id
+from service.schemas.names import Panorama
 from service.schemas.options import FindOptions
 from service.schemas.results import CandidateResult, FindResult
 from service.schemas.venue import Camera, CameraIn, Ignore, NamedField, Venue, VenueIn, require_distinct_ids
 
+WIDEST_DEG, WIDEST_PANORAMA_DEG = 150, 358
 FieldSide = Annotated[
     Literal["near", "far", "left", "right"],
     OPEN_WORD,
@@ -31,9 +33,15 @@ class SoughtCameraIn(Schema):
         description="Lens of the camera. The focal length is searched for, too, if the `sigma` of `fx` is above 2 %. "
         "Absent: lens and pose are found together.",
     )
-    field_of_view_deg: Annotated[Number, Field(ge=5, le=150)] | None = Field(
+    panorama: Annotated[Panorama, OPEN_WORD] | None = Field(
         None,
-        description="Approximate horizontal field of view of an unknown lens: focal lengths within 30 % are tried.",
+        description="Surface of a stitched picture whose lens is not known. Without `field_of_view_deg`, views of 119° "
+        "to 202° are tried.",
+    )
+    field_of_view_deg: Annotated[Number, Field(ge=5, le=WIDEST_PANORAMA_DEG)] | None = Field(
+        None,
+        description="Approximate horizontal field of view of an unknown lens, 150° at most unless it is a `panorama`: "
+        "focal lengths within 30 % are tried, of a panorama within 10 %.",
     )
     pose: PoseIn | None = Field(None, description="Pose of a camera that need not be found.")
     position: Position | None = Field(None, description="Approximate position, m: within `position_radius_m`.")
@@ -49,6 +57,13 @@ class SoughtCameraIn(Schema):
         require_camera_id(self.id)
         if self.intrinsics is not None and self.field_of_view_deg is not None:
             raise ValueError(f"camera {self.id} has intrinsics and field_of_view_deg: leave one of them out")
+        if self.intrinsics is not None and self.panorama is not None:
+            raise ValueError(f"camera {self.id} has intrinsics and panorama: leave one of them out")
+        if self.panorama is None and (self.field_of_view_deg or 0) > WIDEST_DEG:
+            raise ValueError(
+                f"camera {self.id} sees {self.field_of_view_deg:g}°: {WIDEST_DEG}° at most for one lens; say which "
+                "panorama (cylindrical, equirectangular) a stitched picture is"
+            )
         if self.pose is not None and (self.intrinsics is None or self.image_size is None):
             raise ValueError(f"camera {self.id} has a pose, so it needs its intrinsics and image_size, too")
         if self.intrinsics is not None and self.image_size is None:
@@ -99,6 +114,7 @@ def _sought(camera: Camera, options: FindOptions) -> SoughtCameraIn:
         id=camera.id,
         image_size=camera.image_size,
         intrinsics=None if options.find_lens else camera.intrinsics,
+        panorama=camera.intrinsics.panorama if options.find_lens else None,
         ignore=camera.ignore,
     )
     if options.position_radius_m is None:

@@ -11,13 +11,18 @@ from pydantic import BaseModel, Field, model_validator
 
 from service.schemas.base import OPEN_WORD, Id, Integer, Number, Schema
 from service.schemas.lens_limits import LARGEST_COEFFICIENT, LARGEST_SIGMA, LEAST_SIGMA
-from service.schemas.names import OPTIONS_PART, LensModel, SigmaSource
+from service.schemas.names import OPTIONS_PART, PANORAMAS, LensModel, Panorama, SigmaSource
 from service.schemas.rotation import rotate
 
-DISTORTION_LENGTHS: dict[LensModel, tuple[int, ...]] = {"opencv": (0, 4, 5, 8, 12, 14), "fisheye": (0, 4)}
+DISTORTION_LENGTHS: dict[LensModel, tuple[int, ...]] = {
+    "opencv": (0, 4, 5, 8, 12, 14),
+    "fisheye": (0, 4),
+    **dict.fromkeys(PANORAMAS, (0,)),
+}
 COEFFICIENTS: dict[LensModel, tuple[str, ...]] = {
     "opencv": ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4", "tau_x", "tau_y"),
     "fisheye": ("k1", "k2", "k3", "k4"),
+    **dict.fromkeys(PANORAMAS, ()),
 }
 # Parameters of a camera matrix: both focal lengths, the ratio fy/fx, the principal point.
 MATRIX_NUMBERS = ("fx", "fy", "aspect", "cx", "cy")
@@ -94,14 +99,17 @@ class Intrinsics(Schema):
     """The lens: OpenCV's camera matrix in pixels and its distortion coefficients in OpenCV's order."""
 
     model: Annotated[LensModel, OPEN_WORD] = Field(
-        "opencv", description="`fisheye`: OpenCV's fisheye module (Kannala-Brandt)."
+        "opencv",
+        description="`fisheye`: OpenCV's fisheye module (Kannala-Brandt). Pictures that were stitched: `cylindrical`, "
+        "u = fx·θ + cx, v = fy·tan φ + cy, and `equirectangular`, v = fy·φ + cy. θ: angle about the camera's y axis, "
+        "0 forward; φ: angle below the plane across that axis, rad. A tilted horizon is part of the pose.",
     )
     matrix: Annotated[list[Row], Field(min_length=3, max_length=3)] = Field(
         description="OpenCV's camera matrix [[fx, skew, cx], [0, fy, cy], [0, 0, 1]], pixels."
     )
     distortion: Annotated[
         list[Annotated[Number, Field(ge=-LARGEST_COEFFICIENT, le=LARGEST_COEFFICIENT)]], Field(max_length=14)
-    ] = Field(description="0, 4, 5, 8, 12 or 14 coefficients; 0 or 4 for `fisheye`.")
+    ] = Field(description="0, 4, 5, 8, 12 or 14 coefficients; 0 or 4 for `fisheye`, none for panoramas.")
     sigma: dict[str, Deviation] | None = Field(
         None,
         description="Uncertainty of the lens: one standard deviation by parameter; fx, fy, cx and cy in pixels, aspect "
@@ -129,8 +137,10 @@ class Intrinsics(Schema):
             raise ValueError("focal lengths must be above 0 pixels")
         if len(self.distortion) not in DISTORTION_LENGTHS[self.model]:
             *most, last_length = DISTORTION_LENGTHS[self.model]
-            expected = f"{', '.join(map(str, most))} or {last_length}"
+            expected = f"{', '.join(map(str, most))} or {last_length}" if most else last_length
             raise ValueError(f"distortion must have {expected} numbers with the model {self.model}")
+        if self.panorama and self.matrix[0][1] != 0:
+            raise ValueError(f"skew must be 0 with the model {self.model}, came {self.matrix[0][1]:g}")
         return self
 
     @model_validator(mode="after")
@@ -142,6 +152,11 @@ class Intrinsics(Schema):
         if unknown:
             raise ValueError(f"sigma has {', '.join(unknown)}: with the model {self.model} it takes {', '.join(known)}")
         return self
+
+    @property
+    def panorama(self) -> Panorama | None:
+        """Model of the lens of a picture that was stitched onto a cylinder or a sphere; None for other lenses."""
+        return next((model for model in PANORAMAS if model == self.model), None)
 
     @property
     def without_sigma(self) -> "Intrinsics":
@@ -254,12 +269,16 @@ class PictureMotion(Schema):
     since: int = Field(description="The earlier revision.")
     revision: int = Field(description="The revision in use.")
     image_size: list[int] = Field(description="Width and height of the picture, pixels.")
-    ground: Homography | None = Field(description="Of what lies on the ground; null where no ground is in view.")
+    ground: Homography | None = Field(
+        description="Of what lies on the ground; null where hardly any ground is in both pictures: draw anew."
+    )
     ground_residual_px: float | None = Field(
         description="Largest distance between it and the cameras, pixels: lenses bend what a homography keeps straight."
     )
-    far: Homography = Field(description="Of what is so far away that only the camera's rotation and zoom move it.")
-    far_residual_px: float = Field(description="The same for `far`.")
+    far: Homography | None = Field(
+        description="Of what is so far away that only the camera's rotation and zoom move it; null as above."
+    )
+    far_residual_px: float | None = Field(description="The same for `far`.")
 
 
 class Movement(Schema):

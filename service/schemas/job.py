@@ -1,5 +1,6 @@
 """Models of a job: state, progress, result, and the event of its end."""
 
+from collections.abc import Iterable
 from datetime import datetime
 from typing import Annotated, Any, Literal, get_args
 
@@ -134,6 +135,18 @@ class Job(Schema):
     def open(self) -> bool:
         """True while the job is queued or running."""
         return self.status in OPEN_STATUSES
+
+
+def newest_failed(jobs: Iterable[Job]) -> list[str]:
+    """Return the ids of failed jobs to run again, of `jobs`, newest first: of each venue the newest with frames.
+
+    Older frames of a venue are out of date, and a venue has one active job.
+    """
+    newest: dict[str, str] = {}
+    for job in jobs:
+        if job.status == "failed" and job.frames:
+            newest.setdefault(job.venue or job.id, job.id)
+    return list(newest.values())
 
 
 class JobEvent(Attributed):

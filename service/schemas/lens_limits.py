@@ -9,8 +9,17 @@ LARGEST_COEFFICIENT = 1e15
 BOARD_FOCAL_PERCENT = 0.03
 
 
-def assumed_lens_warning(camera: str) -> str:
-    """Return the warning about a camera whose lens has no sigma and is assumed to be well known."""
+# The same of a panorama, whose stitcher says no more than a round number of degrees.
+PANORAMA_FOCAL_PERCENT = 3
+
+
+def assumed_lens_warning(camera: str, *, is_panorama: bool = False) -> str:
+    """Return the warning about a camera whose lens has no sigma: what is assumed in its place."""
+    if is_panorama:
+        return (
+            f"camera {camera}: its panorama has no sigma, and focal length, horizon and vertical scale are taken to be "
+            f"known to {PANORAMA_FOCAL_PERCENT} % of the focal length; a search finds them better"
+        )
     return (
         f"camera {camera}: its lens has no sigma and is taken to be as sure as a good board leaves it, "
         f"{BOARD_FOCAL_PERCENT:g} % of the focal length"

@@ -17,13 +17,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from service.schemas.lens_limits import assumed_lens_warning
-from service.schemas.names import LensModel
+from service.schemas.names import PANORAMAS, LensModel
 
 Array = NDArray[np.float64]
 WIDEST_OPENCV, WIDEST_FISHEYE = 20.0, math.tan(math.radians(89.0))
 """Undistorted radius (at depth 1) up to which the engine uses a lens of each model."""
 SPOKES, STEPS, FARTHER_STEPS = 64, 200, 100
 """Spokes, and rays along each: within twice the picture's radius (steps of 1 %), and farther out (steps of 4 %)."""
+WIDEST_TURN, WIDEST_HEIGHT = math.radians(179.0), math.radians(89.0)
+"""Largest angles about the axis of a panorama and from the plane across it at which the engine uses one."""
 GRID = 64
 """Pixels per side that are tested for a ray: shares are good to a per cent."""
 LEAST_SHARE = 0.1
@@ -89,14 +91,16 @@ def lens_warnings(camera: Any) -> list[str]:
     """
     lens = camera.intrinsics
     doubts = [f"camera {camera.id}: {words}" for words in lens_doubts(lens, camera.image_size)]
-    return doubts if lens.sigma else [*doubts, assumed_lens_warning(camera.id)]
+    return doubts if lens.sigma else [*doubts, assumed_lens_warning(camera.id, is_panorama=lens.model in PANORAMAS)]
 
 
 def lens_doubts(lens: Any, image_size: Sequence[int]) -> list[str]:
     """Return doubts about the parameters of a lens for a picture of `image_size`, in words."""
     width, height = image_size
     seen = map_of(lens.model, lens.matrix, lens.distortion, image_size)
-    return [*_map_doubts(seen), *_matrix_doubts(lens.matrix, width, height)]
+    # Stitchers choose vertical scale and horizon as they like.
+    of_matrix = [] if lens.model in PANORAMAS else _matrix_doubts(lens.matrix, width, height)
+    return [*_map_doubts(seen), *of_matrix]
 
 
 def require_usable_lens(lens: Any, image_size: Sequence[int]) -> None:
@@ -132,6 +136,11 @@ def _map_of(
     (fx, skew, cx), (_, fy, cy), _ = matrix
     middles = [(np.arange(GRID) + 0.5) / GRID * side - 0.5 for side in size]
     columns, rows = np.meshgrid(*middles)
+    away_px = np.hypot(columns - cx, rows - cy)
+    if model in PANORAMAS:
+        highest = WIDEST_HEIGHT if model == "equirectangular" else math.tan(WIDEST_HEIGHT)
+        has_ray = (np.abs(columns - cx) <= fx * WIDEST_TURN) & (np.abs(rows - cy) <= fy * highest)
+        return LensMap(float(1 - has_ray.mean()), float(away_px[~has_ray].min(initial=math.inf)), 1.0, 1.0)
     # Parameters may have any size. A ray that they turn into NaN or infinity counts as none.
     with np.errstate(all="ignore"):
         y = (rows - cy) / fy
@@ -146,10 +155,9 @@ def _map_of(
         beyond = np.argmax(reach >= corner, axis=0)
         used = np.where(beyond > 0, np.minimum(beyond, number), number)
         stretch = reach[used, np.arange(SPOKES)] / radii[used]
-    away_px = np.hypot(columns - cx, rows - cy)[~has_ray]
     return LensMap(
         blind_share=float(1 - has_ray.mean()),
-        radius_px=float(away_px.min(initial=math.inf)),
+        radius_px=float(away_px[~has_ray].min(initial=math.inf)),
         least_denominator=_least_denominator(model, distortion, float(radii[used.max()])),
         stretch=float(stretch.max(initial=0.0, where=used > 0)),
     )

@@ -19,7 +19,11 @@ CALIBRATION_PART = "calibration"
 PHOTOS_PART = "photos"
 SITE_PART = "site"
 
-LensModel = Literal["opencv", "fisheye"]
+LensModel = Literal["opencv", "fisheye", "cylindrical", "equirectangular"]
+# Those of them that photos of a board determine, and those of pictures that were stitched onto a cylinder or a sphere.
+BoardLensModel = Literal["opencv", "fisheye"]
+Panorama = Literal["cylindrical", "equirectangular"]
+PANORAMAS: tuple[Panorama, ...] = get_args(Panorama)
 SigmaSource = Literal["lines"]
 # Export formats of poses, see `service.formats.table`.
 FormatName = Literal[

@@ -7,7 +7,7 @@ from pydantic import ConfigDict, Field, RootModel, StringConstraints, model_vali
 from service.schemas.addresses import CallbackUrl
 from service.schemas.base import OPEN_WORD, Flag, Id, Integer, Number, Schema
 from service.schemas.geometry import Metres
-from service.schemas.names import LensModel
+from service.schemas.names import BoardLensModel
 
 # The same seed finds the same.
 Seed = Annotated[Integer, Field(ge=0, le=2**53 - 1)]
@@ -101,7 +101,7 @@ class IntrinsicsOptions(Handling):
     model_config = ConfigDict(json_schema_extra={"examples": [{"board": {"columns": 9, "rows": 6, "square_m": 0.03}}]})
 
     board: Board
-    model: Annotated[LensModel, OPEN_WORD] = Field(
+    model: Annotated[BoardLensModel, OPEN_WORD] = Field(
         "opencv", description="Lens model to fit: OpenCV's usual one, or its fisheye module's."
     )
 

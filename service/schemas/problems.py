@@ -44,6 +44,9 @@ PROBLEM_TYPES: dict[str, ProblemType] = {
     "token-missing": ProblemType(403, "A signed in page sends its token with what it changes"),
     "scope-too-small": ProblemType(403, "The key does not allow this"),
     "key-for-some-venues": ProblemType(403, "The key is for some venues, and this is about no single one"),
+    "key-exists": ProblemType(409, "There is a key of this name"),
+    "key-not-found": ProblemType(404, "There is no such key"),
+    "key-in-use": ProblemType(409, "The key revokes itself"),
     "rate-limited": ProblemType(429, "Too many requests with this key"),
     "too-many-unknown-keys": ProblemType(429, "Too many unknown keys from this address"),
     # Venues.

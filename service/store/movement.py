@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from fields.shapes import Arc, Line, Shape, Spot
 from service.schemas.field import FieldOfPlay
-from service.schemas.geometry import Moved, PosedCamera
-from service.schemas.names import LensModel
+from service.schemas.geometry import Intrinsics, Moved, PosedCamera
+from service.schemas.names import PANORAMAS, LensModel
 
 Array = NDArray[np.float64]
 # The points on all markings together; rounding adds at most one for each marking.
@@ -57,24 +57,26 @@ def picture_motion(field: FieldOfPlay, before: PosedCamera, after: PosedCamera) 
     half = np.array([field.length_m, field.width_m]) / 2 + BESIDE_M
     steps = [np.linspace(-side, side, GRID) for side in half]
     ground = np.stack(np.meshgrid(*steps), axis=-1).reshape(-1, 2)
-    on_ground = _homography(before, pixels(before, ground), pixels(after, ground))
+    on_ground = _homography(before, pixels(before, ground), after, pixels(after, ground))
     (fx, _, _), (_, fy, _), _ = before.intrinsics.matrix
     width, height = before.image_size
     sides = np.meshgrid(np.linspace(-1, 1, GRID) * width / fx, np.linspace(-1, 1, GRID) * height / fy)
     rays = np.stack([*sides, np.ones_like(sides[0])], axis=-1).reshape(-1, 3)
     turn = _rotation(after) @ _rotation(before).T
-    far = _homography(before, _seen(before, rays), _seen(after, rays @ turn.T))
+    far = _homography(before, _seen(before, rays), after, _seen(after, rays @ turn.T))
     return {
         "ground": None if on_ground is None else on_ground[0],
         "ground_residual_px": None if on_ground is None else on_ground[1],
-        "far": np.eye(3).tolist() if far is None else far[0],
-        "far_residual_px": 0.0 if far is None else far[1],
+        "far": None if far is None else far[0],
+        "far_residual_px": None if far is None else far[1],
     }
 
 
-def _homography(before: PosedCamera, was: Array, now: Array) -> tuple[list[list[float]], float] | None:
-    """Return the homography between pixels (N, 2), and the largest distance from it; None if too few are in view."""
-    seen = _inside(before, was) & np.isfinite(now).all(axis=1)
+def _homography(
+    before: PosedCamera, was: Array, after: PosedCamera, now: Array
+) -> tuple[list[list[float]], float] | None:
+    """Return the homography between pixels (N, 2), and the largest distance from it; None if both see too few."""
+    seen = _inside(before, was) & _inside(after, now)
     if seen.sum() < LEAST_SEEN:
         return None
     found, _ = cv2.findHomography(was[seen], now[seen])
@@ -143,6 +145,8 @@ def pixels(camera: PosedCamera, points: Array) -> Array:
 
 def _seen(camera: PosedCamera, seen_from_camera: Array) -> Array:
     """Project points (N, 3) in the camera's frame (N, 2); NaN behind the camera and beyond the lens model."""
+    if camera.intrinsics.model in PANORAMAS:
+        return _onto_panorama(camera.intrinsics, seen_from_camera)
     across, depth = np.hypot(*seen_from_camera.T[:2]), seen_from_camera[:, 2]
     lens = camera.intrinsics
     distortion = np.array(lens.distortion or [0.0] * 4)
@@ -152,6 +156,16 @@ def _seen(camera: PosedCamera, seen_from_camera: Array) -> Array:
         matrix = np.array(lens.matrix)
         places[held] = _distorted(lens.model, distortion, seen_from_camera[held]) @ matrix[:2, :2].T + matrix[:2, 2]
     return places
+
+
+def _onto_panorama(lens: Intrinsics, seen_from_camera: Array) -> Array:
+    """Project points (N, 3) in the camera's frame to a panorama (N, 2); NaN on its axis."""
+    right, down, ahead = seen_from_camera.T
+    away = np.hypot(right, ahead)
+    slope = down / np.where(away > 0, away, np.nan)
+    height = slope if lens.model == "cylindrical" else np.arctan(slope)
+    matrix = np.array(lens.matrix)
+    return np.asarray(np.column_stack([np.arctan2(right, ahead), height]) @ matrix[:2, :2].T + matrix[:2, 2])
 
 
 def _turning_back(model: LensModel, distortion: Array) -> float:

@@ -112,3 +112,33 @@ class Caddy(Proxy):
         """Takes the path off, where nginx leaves it on."""
         proxied = f"\treverse_proxy {self.upstream}"
         return {proxied: f"\thandle_path {self.root_path}/* {{\n\t{proxied}\n\t}}"} if self.root_path else {}
+
+
+class SignInProxy(Caddy):
+    """Caddy with the sample by which people sign in, in front of what stands in for oauth2-proxy at `sign_in`."""
+
+    def __init__(self, folder: Path, service: Service, sign_in: str, key: str) -> None:
+        self.sign_in, self.key = sign_in, key
+        super().__init__(folder, service)
+
+    def command(self) -> list:
+        command = super().command()
+        file = self.folder / "Caddyfile"
+        site = self.changed(
+            (SAMPLES / "Caddyfile.oidc").read_text(),
+            {
+                "127.0.0.1:8000": self.upstream,
+                "127.0.0.1:4180": self.sign_in,
+                "\nesc.example.com {": f"\n{NAME} {{\n\ttls {self.folder}/certificate.pem {self.folder}/key.pem",
+            },
+        )
+        options = file.read_text()
+        file.write_text(options[: options.index(f"\n{NAME} {{")] + site)
+        return command
+
+    def client(self, key: str | None = None, address: str = "127.0.0.1", **headers: str) -> httpx.Client:
+        """A program with the key of the proxy, unless it is somebody who signs in (`Cookie`) or has another key."""
+        return super().client(key or (None if "Cookie" in headers else self.key), address, **headers)
+
+    def environment(self) -> dict[str, str]:
+        return super().environment() | {"ESC_API_KEY": self.key}

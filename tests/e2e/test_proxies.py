@@ -2,16 +2,18 @@
 
 import shutil
 import socket
+import threading
 import time
 import zlib
 from contextlib import ExitStack
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import httpx
 import pytest
 
 from testbed.parameters import try_first
 from testbed.running import DEADLINE_S, Service, keys_in, png, venue
-from tests.e2e.proxies import NAME, STALL_S, Caddy, Nginx
+from tests.e2e.proxies import NAME, STALL_S, Caddy, Nginx, SignInProxy
 from tests.e2e.routes.event_stream import Stream
 
 # Beside the chunks of a PNG: one that no reader knows.
@@ -52,6 +54,7 @@ def large_png() -> bytes:
     return picture[:33] + chunk + zlib.crc32(b"prIv" + data).to_bytes(4, "big") + picture[33:]
 
 
+@pytest.mark.long
 def test_an_upload_of_200_megabytes_arrives(http, name):
     frame = large_png()
     files = [(camera, (f"{camera}.png", frame)) for camera, count in FRAMES.items() for _ in range(count)]
@@ -65,7 +68,7 @@ def test_what_is_too_large_or_has_no_key_is_refused_by_the_service_itself(http, 
     files = [("left", ("left.png", bytes(49 * 10**6))), ("right", ("right.png", png()))]
     refused = http.post(f"/venues/{name}/calibrate", files=files)
     assert (refused.status_code, refused.headers["content-type"]) == (413, "application/problem+json")
-    with proxy.client() as stranger:
+    with proxy.client(Cookie="_oauth2_proxy=unknown") as stranger:
         assert stranger.put(f"/venues/{name}", json=venue(name)).json()["type"] == "/problems/key-missing"
 
 
@@ -125,3 +128,48 @@ def test_slow_clients_are_let_go_and_hold_up_nobody(proxy, keyed, http, name):
         assert time.monotonic() - begun < 5
         # They hear that they are too slow or too many, or nothing (of Caddy 2.6 an empty 200): not that a job began.
         assert not [answer for answer in (one.recv(4096) for one in slow) if b" 202 " in answer]
+
+
+@pytest.fixture
+def sign_in():
+    """What oauth2-proxy answers: 202 to whom it knows by a cookie, 401 to others."""
+
+    class Handler(BaseHTTPRequestHandler):
+        def do_GET(self):
+            self.send_response(202 if "_oauth2_proxy=known" in self.headers.get("Cookie", "") else 401)
+            self.send_header("Content-Length", "0")
+            self.end_headers()
+
+        def log_message(self, *_):
+            pass
+
+    with ThreadingHTTPServer(("127.0.0.1", 0), Handler) as server:
+        threading.Thread(target=server.serve_forever, args=(0.05,), daemon=True).start()
+        yield f"127.0.0.1:{server.server_port}"
+        server.shutdown()
+
+
+def test_people_who_signed_in_at_a_provider_have_the_key_of_the_proxy_and_programs_their_own(
+    keyed, sign_in, missing, tmp_path
+):
+    if shutil.which(Caddy.program) is None:
+        missing(Caddy.program)
+    service, key = keyed
+    reader = keys_in(service.data).add("people", "read")
+    proxy = SignInProxy(tmp_path, service, sign_in, reader)
+    try:
+        with proxy.client(Cookie="_oauth2_proxy=unknown") as stranger:
+            sent = stranger.get("/ui/jobs")
+            place = f"/oauth2/sign_in?rd=https://{NAME}:{proxy.https_port}/ui/jobs"
+            assert (sent.status_code, sent.headers["location"]) == (302, place)
+        with proxy.client(Cookie="_oauth2_proxy=known") as person:
+            assert person.get("/ui/jobs").status_code == 200
+            assert person.get("/venues").status_code == 200
+            refused = person.put("/venues/theirs", json=venue("theirs"))
+            assert refused.json()["type"] == "/problems/scope-too-small"
+        with proxy.client(key) as program:
+            assert program.get("/keys").status_code == 200
+        with proxy.client("esc_of_nobody", Cookie="_oauth2_proxy=known") as program:
+            assert program.get("/venues").json()["type"] == "/problems/key-unknown"
+    finally:
+        proxy.stop()

@@ -97,6 +97,7 @@ def test_two_cameras_see_the_same_world():
     assert np.corrcoef(here[80:, :-40].ravel(), there[80:, 40:].ravel())[0, 1] > 0.97
 
 
+@pytest.mark.long
 def test_people_move_between_moments_and_the_pitch_stays():
     now = render_frame(FIELD, camera(), Conditions.fair(3), rng()).frame.astype(float)
     later = render_frame(FIELD, camera(), replace(Conditions.fair(3), moment=1), rng()).frame.astype(float)
@@ -111,6 +112,7 @@ def test_a_window_shows_what_the_frame_shows():
     assert np.abs(part.mask - whole.mask[90:186, 150:270]).max() < 0.1
 
 
+@pytest.mark.long
 def test_nothing_outside_the_pitch_is_a_marking():
     outside = Field(105.0, 68.0, 0.12)
     lens = Intrinsics(np.array([[315.0, 0, 239.5], [0, 315.0, 134.5], [0, 0, 1]]), np.zeros(5), SIZE)
@@ -162,6 +164,7 @@ def test_random_venues_are_within_the_laws_and_have_a_ray_for_every_pixel():
         assert any_camera.pose.position[2] >= 5
 
 
+@pytest.mark.long
 def test_far_lines_are_learnt_wider_than_they_are():
     rendering = render_frame(FIELD, camera(), EMPTY, rng())
     assert rendering.target.sum() > rendering.mask.sum()

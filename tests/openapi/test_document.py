@@ -8,8 +8,8 @@ from service.schemas.problems import PROBLEM_TYPES
 from tests.openapi.__main__ import document
 
 VERBS = re.compile(
-    "(accept|adopt|calibrate|cancel|check|delete|draw|explain|export|fetch|get|list|patch|plan|put|receive|reject|report|"
-    "restore|resubmit|stream|submit)(_[a-z]+)+"
+    "(accept|add|adopt|calibrate|cancel|check|delete|draw|explain|export|fetch|get|list|patch|plan|put|receive|reject|report|"
+    "restore|resubmit|revoke|stream|submit)(_[a-z]+)+"
 )
 # Types of problems that no route answers: they are errors of jobs, or of addresses and methods that are no routes, or
 # faults of the service.

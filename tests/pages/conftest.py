@@ -77,10 +77,7 @@ def people(browser):
 
         @cache
         def whoever(url, **how):
-            somebody = known.enter_context(person(browser, url, **how))
-            # The next pages are drawn by the process that draws this one, and have what it has loaded.
-            somebody.new_page().goto("/livez")
-            return somebody
+            return known.enter_context(person(browser, url, **how))
 
         yield whoever
 

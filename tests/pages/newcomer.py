@@ -71,7 +71,7 @@ def finds_the_cameras(page: Page) -> str:
 
 def drop_the_frames(page: Page) -> None:
     """Choose a frame of each camera. Football is the default, and the files are named like the cameras."""
-    page.locator("#frames input[type=file]").set_input_files([frame(camera.id) for camera in VENUE.cameras])
+    page.locator("#frames .drop-zone input").set_input_files([frame(camera.id) for camera in VENUE.cameras])
     expect(page.locator(".found-frames canvas")).to_have_count(len(VENUE.cameras))
 
 

@@ -45,6 +45,7 @@ def test_a_knocked_camera_gets_a_new_first_pose_and_the_others_keep_theirs(stub,
     assert after["right"] == before["right"]
 
 
+@pytest.mark.long
 def test_a_frame_of_another_size_is_refused_before_a_point_is_clicked(stub, visit):
     name = stub.venue("tiny")
     page = visit(stub.url, f"/ui/venues/{name}/first-pose")

@@ -211,3 +211,23 @@ def test_a_knocked_camera_is_accepted_where_it_was_found_by_one_click(stub, visi
     assert asked.startswith("Does camera right stand where it was found? Look at the new pose in its frame")
     page.goto(f"{stub.url}/ui/venues/{name}")
     expect(page.get_by_role("link", name="accepted by hand")).to_be_visible()
+
+
+def test_the_failed_jobs_of_a_list_are_run_again_at_once(stub, visit):
+    name = stub.venue("failing", "fail")
+    failed = stub.calibrated(name)["id"]
+    page = visit(stub.url, f"/ui/jobs?venue={name}", forgiven=("410",))
+    expect(page.locator("td", has_text=failed)).to_be_visible()
+    expect(page.get_by_role("button", name="again")).to_have_count(0)
+    page.goto(f"/ui/jobs?venue={name}&status=failed")
+    address = f"**/jobs/{failed}/again"
+    gone = {"type": "/problems/frames-deleted", "detail": "Its frames are gone."}
+    page.route(address, lambda route: route.fulfill(status=410, json=gone))
+    press_and_confirm(page.get_by_role("button", name="Run 1 again"))
+    expect(page.locator("#says")).to_have_text("0 of 1 jobs run again. Its frames are gone.")
+    page.unroute(address)
+    stub.venue(name)
+    press_and_confirm(page.get_by_role("button", name="Run 1 again"))
+    expect(page.locator("#says")).to_have_text("1 of 1 jobs run again.")
+    (again,) = [job for job in stub.http.get("/jobs", params={"venue": name}).json()["jobs"] if job["id"] != failed]
+    assert stub.end(again["id"])["status"] == "succeeded"

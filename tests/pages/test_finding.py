@@ -9,6 +9,7 @@ from service.schemas.names import id_like
 from service.store.jobs.queries import ONE
 from testbed.running import png, upload
 from tests.pages import browsing
+from tests.service.routes.test_check import calibration
 from tests.service.routes.test_find import depth, find, forget_frames, found, site
 
 
@@ -31,7 +32,7 @@ def test_a_venue_is_made_of_frames_by_three_clicks(stub, visit, files, name):
     page.get_by_label("Id", exact=True).first.fill(name)
     button = page.get_by_role("button", name="Find the cameras")
     expect(page.get_by_text("Still missing: a frame.")).to_be_visible()
-    page.locator("#frames input[type=file]").set_input_files(files)
+    page.locator("#frames .drop-zone input").set_input_files(files)
     expect(button).to_be_enabled()
     page.get_by_label("Stands on the side").first.select_option("near")
     page.get_by_label("Field of view").nth(1).fill("65")
@@ -53,6 +54,55 @@ def test_a_venue_is_made_of_frames_by_three_clicks(stub, visit, files, name):
     expect(page.get_by_text("Taken, as revision 1 of")).to_be_visible()
 
 
+def test_a_calibration_of_another_tool_gives_the_first_poses(stub, visit, files, tmp_path, name):
+    page = visit(stub.url, "/ui/new-venue", forgiven=("400", "422"))
+    page.get_by_label("Id", exact=True).first.fill(name)
+    page.locator("#frames .drop-zone input").set_input_files(files)
+    chosen, spoiled = page.get_by_label("Calibration of any tool"), tmp_path / "Calib.toml"
+    spoiled.write_text("[cam_01]\nmatrix = 1")
+    chosen.set_input_files(spoiled)
+    expect(page.locator("#calibration .wrong")).to_contain_text(
+        "Calib.toml, cam_01.matrix: expected a matrix of 3x3 numbers"
+    )
+    lens = tmp_path / "lens.yaml"
+    lens.write_bytes(calibration("opencv", "top")["top.yml"].partition(b"rvec")[0])
+    chosen.set_input_files(lens)
+    expect(page.locator("#calibration .wrong")).to_contain_text(
+        "Camera lens of the calibration: expected a pose, got none"
+    )
+    expect(page.get_by_role("button", name="Find the cameras")).to_be_enabled()
+    for camera in ("left", "top"):
+        chosen.set_input_files(written(tmp_path, calibration("colmap", camera, "right")))
+        expect(page.get_by_role("status").filter(has_text=f"colmap: {min(camera, 'right')}")).to_contain_text(
+            "Not read: points3D.txt"
+        )
+    expect(page.get_by_text("Still missing: an id of the calibration (right, top) for left.png.")).to_be_visible()
+    page.get_by_label("Id", exact=True).nth(1).fill("top")
+    page.get_by_role("button", name="Create and calibrate").click()
+    expect(page.get_by_role("heading", name=f"Calibration of {name}")).to_be_visible()
+    stored = {camera["id"]: camera for camera in stub.http.get(f"/venues/{name}").json()["cameras"]}
+    assert stored.keys() == {"right", "top"}
+    assert stub.job(page.url.rpartition("/")[2])["frames"].keys() == {"right", "top"}
+
+
+def test_a_calibration_is_put_aside_for_a_search(stub, visit, files, tmp_path):
+    page = visit(stub.url, "/ui/new-venue")
+    page.get_by_label("Calibration of any tool").set_input_files(
+        written(tmp_path, calibration("pose2sim", "left", "right"))
+    )
+    page.locator("#frames .drop-zone input").set_input_files(files)
+    expect(page.get_by_role("button", name="Create and calibrate")).to_be_enabled()
+    page.get_by_role("button", name="Search without it").click()
+    expect(page.get_by_role("button", name="Find the cameras")).to_be_enabled()
+    expect(page.get_by_role("button", name="Create and calibrate")).not_to_be_visible()
+
+
+def written(folder, files):
+    for name, content in files.items():
+        (folder / name).write_bytes(content)
+    return [folder / name for name in files]
+
+
 def test_where_no_calibration_can_follow_the_page_says_so(stub, visit, name):
     job = found(stub, name, place=site(name))
     page = visit(stub.url, f"/ui/jobs/{job['id']}", forgiven=("410",))
@@ -64,11 +114,12 @@ def test_where_no_calibration_can_follow_the_page_says_so(stub, visit, name):
     assert [depth(stub.http.get(f"/venues/{name}").json(), camera) for camera in ("left", "right")] == [40, 40]
 
 
+@pytest.mark.long
 def test_pages_that_were_proposed_the_same_id_search_for_venues_of_their_own(stub, visit, files):
     pages = [visit(stub.url, "/ui/new-venue") for _ in range(2)]
     assert len({page.get_by_label("Id", exact=True).first.input_value() for page in pages}) == 1
     for page in pages:
-        page.locator("#frames input[type=file]").set_input_files(files)
+        page.locator("#frames .drop-zone input").set_input_files(files)
         page.get_by_role("button", name="Find the cameras").click()
         page.wait_for_url("**/ui/jobs/*")
     venues = set()
@@ -189,11 +240,12 @@ def test_a_search_is_followed_to_its_end(stub, visit, name):
     expect(page.get_by_role("button", name="Create the venue")).to_be_enabled()
 
 
+@pytest.mark.long
 def test_everybody_can_use_the_pages_on_which_cameras_are_found_on_a_phone_too(stub, visit, name, files):
     job = found(stub, name, place=site(name, "partly"))
     page = visit(stub.url, "/ui/new-venue")
     page.set_viewport_size({"width": 390, "height": 844})
-    page.locator("#frames input[type=file]").set_input_files(files)
+    page.locator("#frames .drop-zone input").set_input_files(files)
     expect(page.locator(".found-frames li")).to_have_count(2)
     for address in (None, f"/ui/jobs/{job['id']}"):
         if address:

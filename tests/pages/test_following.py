@@ -41,13 +41,14 @@ def open_venue(stub, visit):
 
 
 def test_the_page_of_a_venue_shows_a_new_job_its_end_and_its_revision(stub, open_venue):
-    page = open_venue("watched", "accept 2")
+    page = open_venue("watched")
     expect(page.get_by_role("heading", name="Not calibrated yet")).to_be_visible()
-    job = stub.submitted("watched")
-    going_on = page.get_by_role("region", name="The job that is going on")
-    expect(going_on.locator(".badge")).to_have_text("Running")
-    expect(going_on).to_contain_text("evolution")
-    expect(page.get_by_role("link", name="Calibrate", exact=True)).to_have_count(0)
+    with stub.jobs_held("watched"):
+        job = stub.submitted("watched")
+        going_on = page.get_by_role("region", name="The job that is going on")
+        expect(going_on.locator(".badge")).to_have_text("Running")
+        expect(going_on).to_contain_text("evolution")
+        expect(page.get_by_role("link", name="Calibrate", exact=True)).to_have_count(0)
     stub.end(job)
     expect(page.locator(".verdict-big")).to_have_text(re.compile("Accepted"))
     expect(going_on).to_have_count(0)
@@ -127,6 +128,7 @@ def test_a_hidden_page_holds_no_connection_and_a_page_in_sight_catches_up(tmp_pa
     service.kill()
 
 
+@pytest.mark.long
 def test_what_waits_and_what_runs_are_pills_like_other_states_and_named_alike_all_over_a_page(stub, stored, visit):
     stored.calibrated("pill")
     job = stub.submitted(stub.venue("pills", "accept 60"))
@@ -146,6 +148,7 @@ def test_what_waits_and_what_runs_are_pills_like_other_states_and_named_alike_al
     stub.http.post(f"/jobs/{job}/cancel")
 
 
+@pytest.mark.long
 def test_the_head_of_a_job_that_begins_says_so_as_the_panel_below_does(stub, visit):
     before = stub.submitted(stub.venue("ahead", "accept 60"))
     stub.running(before)
@@ -157,6 +160,7 @@ def test_the_head_of_a_job_that_begins_says_so_as_the_panel_below_does(stub, vis
     stub.http.post(f"/jobs/{job}/cancel")
 
 
+@pytest.mark.long
 def test_a_link_that_is_clicked_as_a_job_ends_is_followed(stub, visit):
     job = stub.submitted(stub.venue("left-behind", "accept 60"))
     stub.running(job)
@@ -175,6 +179,7 @@ def test_a_link_that_is_clicked_as_a_job_ends_is_followed(stub, visit):
     expect(page).to_have_url(re.compile("/ui/venues/left-behind$"))
 
 
+@pytest.mark.long
 def test_a_job_shows_its_end_on_a_page_that_a_download_was_begun_from(stub, visit):
     job = stub.submitted(stub.venue("downloaded", "accept 60"))
     stub.running(job)
@@ -186,6 +191,7 @@ def test_a_job_shows_its_end_on_a_page_that_a_download_was_begun_from(stub, visi
     expect(page.locator(".badge").first).to_have_text("Cancelled")
 
 
+@pytest.mark.long
 def test_the_list_of_venues_goes_on_while_a_link_of_it_has_the_focus(stub, stored, visit):
     stub.venue("chosen")
     page = visit(stub.url, list_from("chosen"))

@@ -67,5 +67,6 @@ def test_an_area_is_drawn_by_keys_alone(page):
     assert (look(frame) != before).any()
 
 
+@pytest.mark.long
 def test_everybody_can_use_it(page):
     assert grave(page) == []

@@ -5,7 +5,6 @@ import itertools
 import pytest
 from playwright.sync_api import expect
 
-from testbed.parameters import try_first
 from testbed.running import venue
 from tests.pages.browsing import tab, wait_until
 from tests.pages.newcomer import describe_a_camera
@@ -26,6 +25,7 @@ def inside(page, part):
     return box["x"] >= 0 and box["x"] + box["width"] <= PHONE["width"]
 
 
+@pytest.mark.long
 def test_a_phone_shows_all_of_each_row_with_what_it_is(stored, phone):
     name = "small"
     job = stored.calibrated(name)
@@ -64,6 +64,7 @@ def test_a_phone_folds_what_is_not_needed_first_and_the_address_opens_it(stored,
     expect(restore).to_be_hidden()
 
 
+@pytest.mark.long
 def test_what_a_phone_has_folded_stays_folded_while_the_page_follows_what_happens(stored, phone):
     name = "unfolded"
     stored.calibrated(name)
@@ -85,6 +86,7 @@ def test_the_magnification_and_its_list_stand_on_one_row_of_a_phone(real, visit)
     assert abs(middles[0] - middles[1]) < 5
 
 
+@pytest.mark.long
 def test_pictures_have_their_height_before_they_are_there(stub, visit):
     stub.http.put("/venues/waiting", json=venue("waiting", cameras=("left", "right"))).raise_for_status()
     stub.calibrated("waiting")
@@ -132,7 +134,8 @@ def test_the_stitched_view_says_that_it_is_being_drawn(real, visit):
     expect(page.get_by_text("The view is being drawn")).to_be_hidden()
 
 
-@pytest.mark.parametrize("sport", try_first(["football", "tennis", "basketball"]))
+@pytest.mark.long
+@pytest.mark.parametrize("sport", ["football", "tennis", "basketball"])
 def test_points_of_a_plan_lie_apart_and_each_can_be_picked(stub, visit, sport):
     page = visit(stub.url, "/ui/new-venue/by-hand")
     page.get_by_label("Sport").select_option(sport)
@@ -153,6 +156,7 @@ def test_points_of_a_plan_lie_apart_and_each_can_be_picked(stub, visit, sport):
     expect(page.locator("[data-point]")).to_have_value(name)
 
 
+@pytest.mark.long
 def test_a_pose_that_one_point_contradicts_is_not_called_good(stub, visit):
     page = visit(stub.url, "/ui/new-venue/by-hand")
     points = [{"residual_px": 0.7, "looks_like": None, "doubted": doubted} for doubted in (False, False, False, True)]

@@ -50,6 +50,7 @@ def test_the_card_moves_with_each_report_and_says_when_none_comes_any_more(stub,
     assert page.evaluate("window.opened")
 
 
+@pytest.mark.long
 def test_the_card_is_for_everybody_and_fits_a_phone(stub, people, sent):
     with tab(people(stub.url)) as page:
         page.set_viewport_size(PHONE)

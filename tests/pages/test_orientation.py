@@ -58,7 +58,7 @@ def file(request, tmp_path):
 @pytest.mark.parametrize(
     ("address", "chooser", "canvas"),
     [
-        ("/ui/new-venue", "#frames input[type=file]", "[data-thumb] canvas"),
+        ("/ui/new-venue", "#frames .drop-zone input", "[data-thumb] canvas"),
         ("/ui/venues/held/calibrate", "[data-camera=left] input[type=file]", ".thumbs canvas"),
         ("/ui/venues/held/find", "[data-camera=left] input[type=file]", ".thumbs canvas"),
         ("/ui/venues/held/ignore", "[data-camera=left] input[type=file]", "[data-camera=left] canvas"),

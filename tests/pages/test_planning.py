@@ -3,6 +3,7 @@
 import json
 import re
 
+import pytest
 from playwright.sync_api import expect
 
 from tests.pages import newcomer
@@ -37,7 +38,7 @@ def test_cameras_are_planned_moved_and_taken_to_a_new_venue(stub, visit):
     page.get_by_role("button", name="New venue with these cameras").click()
     expect(page.get_by_text("Planned: left.")).to_be_visible()
     expect(page.get_by_label("Sport")).to_have_value("volleyball")
-    page.locator("#frames input[type=file]").set_input_files(newcomer.frame("left"))
+    page.locator("#frames .drop-zone input").set_input_files(newcomer.frame("left"))
     page.route("**/find", lambda route: route.abort())
     with page.expect_request("**/find") as sent:
         page.get_by_role("button", name="Find the cameras").click()
@@ -45,6 +46,7 @@ def test_cameras_are_planned_moved_and_taken_to_a_new_venue(stub, visit):
     assert (camera["id"], camera["position"][2], camera["field_of_view_deg"]) == ("left", 12, 75)
 
 
+@pytest.mark.long
 def test_a_plan_says_what_is_missing_and_why_a_camera_cannot_be_calibrated(stub, visit):
     page = visit(stub.url, "/ui/plan", forgiven=("422",))
     make = page.get_by_role("button", name="Plan", exact=True)

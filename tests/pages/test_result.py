@@ -3,8 +3,9 @@
 import pytest
 from playwright.sync_api import expect
 
-from testbed.parameters import try_first
 from tests.pages.browsing import differs, look, tab, wait_until
+
+pytestmark = pytest.mark.long
 
 
 @pytest.fixture(scope="module")
@@ -83,7 +84,7 @@ def test_the_magnifier_enlarges_by_as_much_as_is_chosen_and_follows_the_pointer(
     assert differs(enlarged, look(after)) > 0.1
 
 
-@pytest.mark.parametrize("name", try_first(["New pose", "Stored pose", "Detected lines"]))
+@pytest.mark.parametrize("name", ["New pose", "Stored pose", "Detected lines"])
 def test_each_layer_is_drawn_on_each_frame_and_taken_off(venue, name):
     frames = venue.locator(".layers")
     for other in ("Stored pose", "New pose", "Detected lines"):

@@ -16,6 +16,7 @@ def years(stub):
     return "decade"
 
 
+@pytest.mark.long
 def test_a_venue_with_a_thousand_jobs_is_painted_within_a_second(stub, years, visit):
     page = visit(stub.url, f"/ui/venues/{years}")
     page.locator("#chart canvas").wait_for()

@@ -69,6 +69,7 @@ def test_each_camera_says_how_far_it_has_moved_and_draws_it(stub, drifted, visit
     expect(moved.locator(".u-legend")).to_contain_text(re.compile(r"20\d\d-\d\d-\d\d.*\d+\.\d ± \d\.\d cm", re.DOTALL))
 
 
+@pytest.mark.long
 def test_band_average_and_dots_can_be_told_from_the_ground(stub, drifted, visit):
     page = visit(stub.url, drifted)
     chart = page.get_by_role("img", name="Camera left. Moved")

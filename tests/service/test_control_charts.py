@@ -26,11 +26,13 @@ def first_told(values, baseline=USUAL, sigma=1.0):
     return next((n for n, point in enumerate(points, 1) if point and point.is_beyond), len(values))
 
 
+@pytest.mark.long
 def test_nothing_happens_for_most_of_a_year_between_false_alarms():
     runs = [first_told(noise(seed, 3000)) for seed in range(120)]
     assert fmean(runs) > 250
 
 
+@pytest.mark.long
 def test_with_a_baseline_of_twenty_nights_few_ring_within_three_months():
     runs = []
     for seed in range(120):

@@ -95,6 +95,22 @@ class Silent(Receiver):
         time.sleep(3600)
 
 
+class Holding(Receiver):
+    """Takes what comes, and answers when it is let go."""
+
+    def __init__(self) -> None:
+        self.go = threading.Event()
+        super().__init__()
+
+    def respond(self, request: BaseHTTPRequestHandler, status: int) -> None:
+        self.go.wait(60)
+        super().respond(request, status)
+
+    def close(self) -> None:
+        self.go.set()
+        super().close()
+
+
 class Dripping(Receiver):
     """Sends a byte of its headers, and another, and another."""
 

@@ -73,8 +73,15 @@ def _given(camera: CheckedCamera, size: tuple[int, int]) -> GivenCamera:
     resized = None if larger is None else replace(lens.scaled(larger), size=size)
     pose = NO_POSE if camera.pose is None else _pose(camera.pose)
     return GivenCamera(
-        engine.Camera(camera.id, lens, pose), written_for != size, resized, has_pose=camera.pose is not None
+        engine.Camera(camera.id, lens, pose), written_for != size, resized, _reordered(lens), camera.pose is not None
     )
+
+
+def _reordered(lens: Lens) -> Lens | None:
+    """Return a lens whose five coefficients are read as k1, k2, k3, p1, p2; None where that changes nothing."""
+    if lens.model != "opencv" or len(lens.distortion) != 5 or np.ptp(lens.distortion[2:]) == 0:
+        return None
+    return replace(lens, distortion=lens.distortion[[0, 1, 3, 4, 2]])
 
 
 NO_POSE = engine.Pose(np.zeros(3), np.zeros(3))

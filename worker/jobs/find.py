@@ -12,11 +12,16 @@ from service.schemas.find import SoughtCameraIn, SoughtSite
 from service.schemas.geometry import Intrinsics, PosedCamera
 from service.schemas.geometry import Pose as PoseSchema
 from service.schemas.lens_map import lens_doubts
+from service.schemas.names import Panorama as PanoramaModel
 from service.schemas.results import CandidateResult, FindResult, FoundCameraResult
 from service.store.jobs.files import candidate_picture_name
 from worker.calibration.find_cameras import FoundCamera, FoundCameras, find_cameras
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.field import Field
+from worker.calibration.geometry.lens_models import PANORAMAS
+from worker.calibration.geometry.panorama import Panorama
+from worker.calibration.geometry.parameters import free_lens_sigma
+from worker.calibration.planning.stand import field_of_view_deg
 from worker.calibration.relocalisation.candidate import Candidate
 from worker.calibration.relocalisation.sought import (
     BENDS,
@@ -24,7 +29,9 @@ from worker.calibration.relocalisation.sought import (
     Place,
     SoughtCamera,
     SoughtLens,
+    guessed_panoramas,
     lenses_of_view,
+    panorama_of_view,
     unknown_lenses,
 )
 from worker.calibration.rendering.overlays import candidate_picture
@@ -53,9 +60,15 @@ from worker.jobs.to_schemas import (
     sigma_to_schema,
 )
 
+USUAL_PANORAMA_DEG = 155.0
+"""Field of view of a panorama of which nothing is said; with 30 % to either side, cameras of two to four lenses."""
+WIDEST_SENSOR = 2.1
+"""Ratio of width to height beyond which a picture was stitched or cropped: sensors are 2 to 1 at most."""
 log = logging.getLogger(__name__)
 FIELD_OF_VIEW_UNCERTAIN = 0.15
 """One standard deviation of the focal length that a given field of view leaves, as a part of it."""
+PANORAMA_UNCERTAIN = 0.05
+"""The same of a panorama, whose data sheet gives its angle to the nearest ten degrees: what is stitched is cropped."""
 
 
 def solve(
@@ -95,14 +108,32 @@ def sought_camera(camera: SoughtCameraIn, size: tuple[int, int]) -> SoughtCamera
     position = None if camera.position is None else np.array(camera.position)
     place = Place(camera.side, position, camera.position_radius_m)
     ignored = ignored_areas_of(camera.ignore, size)
+    if camera.panorama is not None:
+        return SoughtCamera(camera.id, _panoramas(camera.panorama, size, camera.field_of_view_deg), place, ignored)
     if camera.intrinsics is not None:
         lens = lens_of(camera.intrinsics, list(size))
+        if isinstance(lens, Panorama):
+            sigma = free_lens_sigma(lens) | dict(lens.sigma)
+            guessed = guessed_panoramas(lens, sigma["fx"] / lens.focal_length_px)
+            return SoughtCamera(camera.id, guessed, place, ignored)
         known = SoughtLens.around(lens, lens.sigma.get("fx", 0.0) / lens.focal_length_px)
         return SoughtCamera(camera.id, [known], place, ignored)
     if camera.field_of_view_deg is not None:
         of_view = partial(lenses_of_view, size, camera.field_of_view_deg, FIELD_OF_VIEW_UNCERTAIN)
         return SoughtCamera(camera.id, of_view(BENDS), place, ignored, of_view(OTHER_BENDS))
-    return SoughtCamera(camera.id, unknown_lenses(size, BENDS), place, ignored, unknown_lenses(size, OTHER_BENDS))
+    others = _panoramas("cylindrical", size, None) if _is_stitched(size) else unknown_lenses(size, OTHER_BENDS)
+    return SoughtCamera(camera.id, unknown_lenses(size, BENDS), place, ignored, others)
+
+
+def _is_stitched(size: tuple[int, int]) -> bool:
+    """True for pictures (width, height) of a shape that no sensor has."""
+    return size[0] > WIDEST_SENSOR * size[1]
+
+
+def _panoramas(model: PanoramaModel, size: tuple[int, int], view_deg: float | None) -> list[SoughtLens]:
+    """Return panoramas of about this field of view, or of a usual one."""
+    uncertain = FIELD_OF_VIEW_UNCERTAIN if view_deg is None else PANORAMA_UNCERTAIN
+    return guessed_panoramas(panorama_of_view(size, PANORAMAS[model], view_deg or USUAL_PANORAMA_DEG), uncertain)
 
 
 def _known(camera: SoughtCameraIn) -> Camera:
@@ -141,6 +172,10 @@ def _result(
         if camera.intrinsics is not None and camera.image_size is not None
     }
     remarks = {one.id: [*doubts.get(one.id, []), *dict.fromkeys(frame_remarks[one.id])] for one in sought}
+    undeclared = {camera.id for camera in site.cameras if camera.intrinsics is None and camera.panorama is None}
+    for one, camera in zip(found.cameras, sought, strict=True):
+        if one.id in undeclared:
+            remarks[one.id] += _stitched_remark(one, camera.size)
     refusals = [f"camera {one.id}: {one.refusal.words}" for one in found.cameras if one.refusal is not None]
     return FindResult(
         accepted=not refusals,
@@ -152,6 +187,22 @@ def _result(
         cpu_s=round_to_ms(found.timings.core_seconds),
         provenance=provenance,
     )
+
+
+def _stitched_remark(found: FoundCamera, size: tuple[int, int]) -> list[str]:
+    """Return in words that the frame of a camera without a lens is a stitched panorama, or may be one."""
+    camera = found.candidates[0].camera if found.accepted else None
+    if camera is not None and isinstance(camera.intrinsics, Panorama):
+        return [
+            f"this is a stitched panorama of {field_of_view_deg(camera):.0f}°: its lines fit no lens of a single "
+            f"camera, and fit one that is {camera.intrinsics.model}"
+        ]
+    if camera is None and _is_stitched(size):
+        return [
+            f"this picture is {size[0] / size[1]:.1f} times as wide as high, as no sensor is: if it is a stitched "
+            f"panorama, say which (panorama: {', '.join(PANORAMAS)}) and its field_of_view_deg"
+        ]
+    return []
 
 
 def _camera(found: FoundCamera, size: tuple[int, int], remarks: Sequence[str]) -> FoundCameraResult:

@@ -15,7 +15,8 @@ from service.schemas.names import problem_uri
 from worker.calibration.geometry.camera import Camera, Pose
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.ignored_areas import Ignored
-from worker.calibration.geometry.lens import LENSES, Lens
+from worker.calibration.geometry.lens import Lens
+from worker.calibration.geometry.lens_models import LENSES
 from worker.calibration.stitching.photometry import Light
 from worker.calibration.stitching.views import ViewChoice
 from worker.jobs.documents import JobError

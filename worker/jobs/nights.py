@@ -18,7 +18,7 @@ from worker.calibration.geometry.camera import Array, Camera
 from worker.calibration.geometry.derivatives import POSE_NUMBERS
 from worker.calibration.geometry.far_marking import far_marking_shift_m
 from worker.calibration.geometry.field import Field
-from worker.calibration.geometry.lens import SIGMA_NAMES
+from worker.calibration.geometry.lens import SIGMA_NAMES, Lens
 from worker.calibration.memory.camera_memory import CameraMemory
 from worker.calibration.refinement import uncertainty
 from worker.jobs.documents import LensChange, Refined
@@ -38,9 +38,10 @@ def refined_to_schema(pitch: Field, found: CameraResult) -> Refined | None:
         return None
     focal, focal_refined = (one.intrinsics.focal_length_px for one in (found.camera, refined.camera))
     covariance = refined.covariance if np.isfinite(refined.covariance).all() else None
+    sigma = _lens_sigma(refined.camera.intrinsics, covariance)
     return Refined(
         pose=pose_to_schema(refined.camera.pose),
-        intrinsics=lens_to_schema(refined.camera.intrinsics).model_copy(update={"sigma": _lens_sigma(covariance)}),
+        intrinsics=lens_to_schema(refined.camera.intrinsics).model_copy(update={"sigma": sigma}),
         covariance=None if covariance is None else covariance.tolist(),
         sigma=sigma_to_schema(refined.sigma),
         longer=focal_refined / focal - 1,
@@ -59,12 +60,13 @@ def _is_a_camera(camera: Camera) -> bool:
     return bool(np.abs(lens.distortion).max(initial=0.0) <= LARGEST_COEFFICIENT) and seen.is_usual
 
 
-def _lens_sigma(covariance: Array | None) -> dict[str, float] | None:
+def _lens_sigma(lens: Lens, covariance: Array | None) -> dict[str, float] | None:
     """The standard deviations of the numbers of a lens, from the (12, 12) of pose and lens."""
     if covariance is None:
         return None
     sigma = np.sqrt(np.diag(covariance)[POSE_NUMBERS:]).clip(LEAST_SIGMA, LARGEST_SIGMA)
-    return dict(zip(SIGMA_NAMES.values(), sigma.tolist(), strict=True))
+    named = zip(SIGMA_NAMES.items(), sigma.tolist(), strict=True)
+    return {short: value for (name, short), value in named if name in lens.parameters}
 
 
 def lens_change_to_schema(found: CameraResult, tonight: datetime | None) -> LensChange | None:

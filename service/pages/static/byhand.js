@@ -1,8 +1,8 @@
 // A new venue by hand, with clicked first poses. Its data stay in the browser until the venue is created.
 
-import {call, Refused, root, signed} from "./page.js";
 import {missingOfPitch, pitch, pitchForm, readForm} from "./pitch.js";
 import {Camera, common} from "./posing.js";
+import {createAndCalibrate} from "./steps.js";
 
 const createButton = document.getElementById("create");
 const missing = document.getElementById("missing");
@@ -36,14 +36,8 @@ async function create() {
   createButton.disabled = refused.hidden = true;
   try {
     const venue = {id, name: pitchForm.elements.name.value, field: common.plan.field, cameras: cameras.map((camera) => camera.wire)};
-    const answer = await fetch(`${root}/venues/${id}`, {method: "PUT", headers: {...signed, "Content-Type": "application/json", ...(create.done ? {} : {"If-None-Match": "*"})}, body: JSON.stringify(venue)});
-    if (!answer.ok) throw new Refused(await answer.json(), answer.status);
-    create.done = true;
-    const body = new FormData();
-    for (const camera of cameras) body.append(camera.id, camera.file);
-    missing.textContent = "Sending the frames …";
-    const job = await call("POST", `${root}/venues/${id}/calibrate`, body);
-    location.assign(`${root}/ui/jobs/${job.id}`);
+    const frames = cameras.map((camera) => [camera.id, camera.file]);
+    await createAndCalibrate(venue, frames, () => { missing.textContent = "Sending the frames …"; });
   } catch (problem) {
     refused.textContent = problem.message;
     refused.hidden = false;

@@ -1,9 +1,10 @@
-// A new venue by its sport and a frame of each camera: submits a search for the cameras.
+// A new venue by its sport and a frame of each camera: submits a search for the cameras, or creates it with the poses of
+// a calibration that another tool has made.
 
 import {call, root} from "./page.js";
 import {objection, sizeOf, thumbnail} from "./frames.js";
 import {missingOfPitch, pitch, pitchForm, readForm} from "./pitch.js";
-import {complain, idLike, number} from "./steps.js";
+import {complain, createAndCalibrate, idLike, number} from "./steps.js";
 
 const box = document.getElementById("frames");
 const list = box.querySelector("ul");
@@ -18,6 +19,10 @@ const NARROWEST_DEG = 5;
 const cameras = [];
 /** Cameras of the plan that this page was opened with, by their ids. */
 const planned = new Map();
+const calibrationBox = document.getElementById("calibration");
+const [chosenFiles, unread, read, without] = ["input", ".wrong", "[role=status]", "button"].map((part) => calibrationBox.querySelector(part));
+/** Calibration of another tool, as the service read it: its `format`, `cameras` as a venue takes them, and `not_read`. */
+let calibration = null;
 
 /** An unused camera id after the name of a file. */
 function idOf(file) {
@@ -80,19 +85,62 @@ function tell() {
   if (!cameras.length) open.push("a frame");
   if (cameras.some((camera) => !camera.id || !camera.field("camera").checkValidity())) open.push("an id of each camera");
   if (new Set(cameras.map((camera) => camera.id)).size < cameras.length) open.push("cameras of different names");
+  const unknown = calibration ? cameras.filter((camera) => !calibrated(camera)) : [];
+  if (unknown.length) open.push(`an id of the calibration (${calibration.cameras.map((camera) => camera.id).join(", ")}) for ${unknown.map((camera) => camera.file.name).join(", ")}`);
   button.disabled = open.length > 0;
   missing.textContent = open.length ? `Still missing: ${open.join("; ")}.` : "";
 }
 
+/** The camera of the calibration that a frame is of; the only one of a file has any name. */
+function calibrated(camera) {
+  const [only, ...others] = calibration.cameras;
+  if (!others.length && cameras.length === 1) return {...only, id: camera.id};
+  return calibration.cameras.find((one) => one.id === camera.id);
+}
+
+/** Read a calibration at once, so that what is wrong with it is said here and not after a job. */
+async function readCalibration(files) {
+  const body = new FormData();
+  for (const file of files) body.append("calibration", file);
+  try {
+    takeCalibration(await call("POST", `${root}/ui/new-venue/calibration`, body));
+    complain(unread, "");
+  } catch (problem) {
+    takeCalibration(null);
+    complain(unread, problem.message);
+  }
+}
+
+function takeCalibration(found) {
+  calibration = found;
+  const words = found && [`${found.format}: ${found.cameras.map((camera) => camera.id).join(", ")}.`, ...found.not_read.map((why) => `Not read: ${why}.`)].join(" ");
+  complain(read, words);
+  without.hidden = !found;
+  for (const part of document.querySelectorAll("[data-search]")) part.hidden = Boolean(found);
+  for (const part of document.querySelectorAll("[data-calibrated]")) part.hidden = !found;
+  tell();
+}
+
+/** Create the venue with the cameras of the calibration whose frames are here. */
+function create() {
+  const venue = {id: pitchForm.elements.id.value, name: pitchForm.elements.name.value, field: pitch.plan.field, cameras: cameras.map(calibrated)};
+  return createAndCalibrate(venue, cameras.map((camera) => [camera.id, camera.file]), () => {});
+}
+
 async function find() {
+  const {id} = pitchForm.elements;
+  const job = await call("POST", `${root}/venues/${id.value}/find`, upload(id.value));
+  location.assign(`${root}/ui/jobs/${job.id}`);
+}
+
+async function send() {
   const proposed = pitchForm.elements.id;
   button.disabled = refused.hidden = true;
   missing.textContent = "Sending the frames …";
   try {
     // Another page may have used the proposed id since, and two searches for one venue would conflict.
-    if (proposed.value === proposed.defaultValue) proposed.value = proposed.defaultValue = (await call("GET", `${root}/ui/new-venue/free`)).id;
-    const job = await call("POST", `${root}/venues/${proposed.value}/find`, upload(proposed.value));
-    location.assign(`${root}/ui/jobs/${job.id}`);
+    if (proposed.value === proposed.defaultValue && proposed.value !== createAndCalibrate.done) proposed.value = proposed.defaultValue = (await call("GET", `${root}/ui/new-venue/free`)).id;
+    await (calibration ? create() : find());
   } catch (problem) {
     refused.textContent = problem.message;
     refused.hidden = false;
@@ -127,13 +175,26 @@ function take() {
   input.value = "";
 }
 
+/** The same for a calibration. */
+function takeFiles() {
+  if (chosenFiles.files.length === 0) return;
+  readCalibration([...chosenFiles.files]);
+  chosenFiles.value = "";
+}
+
 input.addEventListener("change", take);
 takePlan();
 take();
+chosenFiles.addEventListener("change", takeFiles);
+takeFiles();
+without.addEventListener("click", () => takeCalibration(null));
 document.addEventListener("dragover", (event) => event.preventDefault());
 document.addEventListener("drop", (event) => {
   event.preventDefault();
-  add([...event.dataTransfer.files]);
+  const dropped = [...event.dataTransfer.files];
+  const pictures = dropped.filter((file) => file.type.startsWith("image/"));
+  if (pictures.length) add(pictures);
+  if (dropped.length > pictures.length) readCalibration(dropped.filter((file) => !pictures.includes(file)));
 });
-button.addEventListener("click", find);
+button.addEventListener("click", send);
 readForm(tell);

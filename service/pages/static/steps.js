@@ -1,5 +1,6 @@
 // Shared code of the pages that describe a venue step by step.
 
+import {call, root} from "./page.js";
 import {drawn} from "./sighting.js";
 
 const PAUSE = 250;
@@ -11,6 +12,18 @@ export function complain(place, text) {
 
 export function number(text) {
   return text.trim() === "" ? undefined : Number(text.replace(",", "."));
+}
+
+/** Create a venue with first poses, then calibrate it with `frames`, a file of each camera; `told`: that these are sent. */
+export async function createAndCalibrate(venue, frames, told) {
+  // A venue that this page has created is there when its frames are sent again.
+  await call("PUT", `${root}/venues/${venue.id}`, venue, createAndCalibrate.done === venue.id ? {} : {"If-None-Match": "*"});
+  createAndCalibrate.done = venue.id;
+  const body = new FormData();
+  for (const [camera, file] of frames) body.append(camera, file);
+  told();
+  const job = await call("POST", `${root}/venues/${venue.id}/calibrate`, body);
+  location.assign(`${root}/ui/jobs/${job.id}`);
 }
 
 // Latin letters that Unicode does not decompose, as in `id_like` of the service.

@@ -34,6 +34,7 @@ TAGS = [
         "description": "What is computed: calibrations, fits of the field, lenses, first poses and searches for "
         "cameras, with their progress, results and pictures.",
     },
+    {"name": "keys", "description": "API keys: who may call, and what."},
     {
         "name": "health",
         "description": "Whether the service is alive and ready, its figures, and what its problems mean.",

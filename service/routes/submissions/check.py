@@ -55,7 +55,7 @@ async def submit_check(request: Request, context: InContext, sender: FromSender)
 
 def _submit(context: Context, form: FormData, sender: Sender) -> Response:
     options = forms.parse_options(form, CheckOptions, context.settings)
-    found = _read_calibration(context, form)
+    found = read_calibration(context, form)
     frames = forms.files_by_camera(form, (OPTIONS_PART, CALIBRATION_PART))
     if not frames:
         raise Problem(
@@ -70,7 +70,7 @@ def _submit(context: Context, form: FormData, sender: Sender) -> Response:
     return job_submission.submission_response(*job_submission.submit_files(context, None, given, frames, sender))
 
 
-def _read_calibration(context: Context, form: FormData) -> CalibrationFile:
+def read_calibration(context: Context, form: FormData) -> CalibrationFile:
     """Return what the parts `calibration` of a form have, by their file names."""
     files: dict[str, bytes] = {}
     size = 0

@@ -45,6 +45,8 @@ OTHERWISE = {
     ("GET", "/ui/new-venue/by-hand"): "admin",
     ("POST", "/ui/new-venue/plan"): "read",
     ("PUT", "/venues/{venue_id}/live"): "calibrate",
+    ("GET", "/keys"): "admin",
+    ("POST", "/keys"): "admin",
 }
 JOB = "01KAJ3Q6WZ5T3Y8R0N4M2C7B1D"
 
@@ -112,6 +114,7 @@ def test_every_route_says_who_may_call_it_and_means_it(guarded, key, routes):
             version="0",
             path="page.css",
             name="refused",
+            key_name="nobody",
         )
         for caller in (None, *SCOPES):
             answer = guarded.http.request(method, path, headers=bearer(key[caller]) if caller else {})

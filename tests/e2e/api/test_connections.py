@@ -24,7 +24,7 @@ def crowded(tmp_path_factory):
     limits = {"ESC_CONNECTIONS": str(CONNECTIONS), "ESC_FOLLOWERS": "2", "ESC_WAITERS": "2"}
     running = Service(tmp_path_factory.mktemp("crowded"), ESC_STALL_TIMEOUT_S="120", **limits).ready()
     resource.prlimit(running.process.pid, resource.RLIMIT_NOFILE, (OPEN_FILES, OPEN_FILES))
-    running.venue("stadium", "accept 3")
+    running.venue("stadium", "accept 1")
     yield running
     assert running.stop() == 0
     assert '"status": 500' not in (running.data / "log").read_text()
@@ -80,14 +80,14 @@ def test_whose_answer_is_held_is_not_put_out_by_strangers(crowded):
             assert answer.json()["status"] == "succeeded"
             crowded.http.close()
             crowded.http = httpx.Client(base_url=crowded.url, timeout=60)
-            crowded.venue("stadium", "accept 3 ")
+            crowded.venue("stadium", "accept 1 ")
         wait_for(lambda: "venue." in next(lines))
 
 
 def test_only_so_many_answers_are_held_for_jobs(crowded):
-    crowded.venue("long", "accept 4")
-    job = crowded.submitted("long")
     with ExitStack() as stack:
+        stack.enter_context(crowded.jobs_held("long"))
+        job = crowded.submitted(crowded.venue("long"))
         held = []
         for _ in range(2):
             stream = stack.enter_context(httpx.stream("GET", f"{crowded.url}/jobs/{job}/events", timeout=30))

@@ -278,6 +278,24 @@ def test_jobs_are_listed_waited_for_and_submitted_again(service, esc, name):
     assert esc("job", "list", "--venue", name, "--status", "failed").stdout == ""
 
 
+def test_the_newest_failed_job_of_each_venue_is_submitted_again_by_one_command(service, esc, name):
+    service.venue(name, "fail")
+    older, newer = (service.calibrated(name, shade)["id"] for shade in (1, 2))
+    service.venue(name)
+    (row,) = json.loads(esc("job", "again", "--failed", "--venue", name).stdout)
+    assert (row["job"], row["why"]) == (newer, None)
+    accepted = service.end(row["again"])
+    assert accepted["status"] == "succeeded"
+
+    service.http.delete(f"/jobs/{older}").raise_for_status()
+    named = esc("job", "again", older, accepted["id"])
+    refused, again = json.loads(named.stdout)
+    assert (named.returncode, refused["again"], refused["why"][:20]) == (1, None, "There is no such job")
+    assert service.end(again["again"])["status"] == "succeeded"
+    assert esc("job", "again").returncode == 2
+    assert esc("job", "again", accepted["id"], "--failed").returncode == 2
+
+
 def test_the_trend_of_a_venue_is_a_line_per_camera_and_that_of_a_camera_a_line_per_night(service, esc, name):
     service.calibrated(service.venue(name))
     service.calibrated(name)
@@ -456,7 +474,7 @@ def test_a_data_folder_that_cannot_be_made_is_told_by_its_name(tmp_path, command
 def test_a_data_folder_without_rights_is_told_by_its_name(tmp_path):
     folder = tmp_path / "locked"
     folder.mkdir(mode=0o500)
-    command = [sys.executable, "-m", "service.cli", "serve", "--port", "0", "--data", folder]
+    command = [sys.executable, "-m", "service.cli", "key", "add", "a", "--scope", "read", "--data", folder]
     # What a thread may not do, what it starts may not do.
     with ThreadPoolExecutor(1, initializer=drop_capabilities) as thread:
         answer = thread.submit(subprocess.run, command, capture_output=True, text=True).result()

@@ -229,12 +229,14 @@ def test_alone_it_does_the_same_without_blocking(service, program, name):
     assert program(AWAITED, service.url, name) == ["accept succeeded {"]
 
 
+@pytest.mark.long
 def test_alone_it_reads_what_a_newer_service_says(service, program, name):
     service.calibrated(service.venue(name))
     with later(service, {"verdict": "hazy", "lens": "breathing"}) as newer:
         assert program(READ, newer.url, name) == ["breathing hazy poses.current"]
 
 
+@pytest.mark.long
 def test_the_programs_of_its_page_run(service, program, tmp_path, name):
     service.venue(name)
     blocking, finding, awaited = (
@@ -252,6 +254,7 @@ def test_the_programs_of_its_page_run(service, program, tmp_path, name):
     assert [line.split()[1] for line in program(until_first)] == ["poses.current"]
 
 
+@pytest.mark.long
 def test_alone_it_leaves_it_to_the_service_to_judge_schedules(service, program, name):
     (said,) = program(SCHEDULED, service.url, service.venue(name))
     assert said.startswith("422 ")

@@ -95,6 +95,7 @@ def test_a_command_whose_output_nobody_reads_any_more_ends_in_silence(arguments)
     assert [line for line in told.splitlines() if not line.startswith("Sending the poses")] == []
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_a_camera_is_tracked_in_its_stream_and_of_the_other_one_the_stored_pose_is_sent(service, name, tmp_path):
     clip = film_left(tmp_path)

@@ -3,6 +3,7 @@
 import json
 
 import cv2
+import pytest
 
 from testbed.synthetic import CROWNED, pair
 from testbed.venue_documents import venue_document
@@ -16,6 +17,7 @@ def planned(folder, cameras, *more):
     return esc_here(folder, "plan", "site.json", "-o", "out", *more)
 
 
+@pytest.mark.long
 def test_a_plan_is_a_document_maps_in_numbers_and_pictures(tmp_path):
     (tmp_path / "venue.json").write_text(json.dumps(venue_document("ground", CROWNED, pair())))
     said = esc_here(tmp_path, "plan", "venue.json", "-o", "out", "--lines", "worn")

@@ -39,6 +39,7 @@ def test_clips_of_a_venue_file_become_one_clip(esc, venue_file, clips, tmp_path)
         assert clip.streams.video[0].width == 320
 
 
+@pytest.mark.long
 def test_the_result_is_told_as_json(esc, venue_file, clips):
     answer = esc("stitch", venue_file, *clips, "-o", "pano.mkv", "--from", "0:01", "--to", "2.5", "--json", *SHOWN)
     made = json.loads(answer.stdout)

@@ -124,6 +124,7 @@ def test_a_job_that_fails_is_a_span_that_failed(traced):
     assert (whole.status.code, attributes(whole)["error.type"]) == (2, "/problems/job-crashed")
 
 
+@pytest.mark.long
 def test_a_collector_that_is_away_holds_nothing_up(start):
     away = {"OTEL_EXPORTER_OTLP_ENDPOINT": "http://127.0.0.1:9", "OTEL_EXPORTER_OTLP_TIMEOUT": "1"}
     service = start("up", OTEL_BSP_SCHEDULE_DELAY="100", **away).ready()
@@ -137,6 +138,7 @@ def python(program, **environment):
     )
 
 
+@pytest.mark.long
 def test_without_an_endpoint_nothing_that_sends_is_loaded():
     light = python(LIGHT)
     assert light.returncode == 0, light.stderr

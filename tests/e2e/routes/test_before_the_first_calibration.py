@@ -62,6 +62,7 @@ def test_photos_of_a_board_become_a_lens(service):
     assert job["id"] in [one["id"] for one in service.http.get("/jobs").json()["jobs"]]
 
 
+@pytest.mark.long
 def test_the_same_key_and_photos_are_the_same_job(service):
     two = photos(count=1)
     key = {"Idempotency-Key": "lens-1"}
@@ -146,6 +147,7 @@ def test_the_frame_the_points_were_clicked_in_is_shown_with_them(service, name):
     assert drawn.std() > 5
 
 
+@pytest.mark.long
 def test_points_that_fix_no_pose_end_with_what_to_add(service, name):
     service.http.put(f"/venues/{name}", json=venue(name)).raise_for_status()
     line = [{"world": [x, -30], "pixel": [100 + 20 * x, 900 + x]} for x in (0, 10, 20, 30)]
@@ -233,6 +235,7 @@ def test_esc_says_which_cameras_had_their_points_exchanged(tmp_path):
     assert not (tmp_path / "v.json").exists()
 
 
+@pytest.mark.long
 def test_esc_hints_at_points_of_one_camera_that_were_given_for_two(tmp_path):
     """With the lens fitted to them, the points of another camera fit; the focal length is the other one's."""
     longer = replace(LENS, matrix=LENS.matrix * [[1.08, 1, 1], [1, 1.08, 1], [1, 1, 1]])

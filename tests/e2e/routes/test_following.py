@@ -8,18 +8,22 @@ import subprocess
 import sys
 from pathlib import Path
 
+import cv2
 import httpx
+import numpy as np
 import pytest
+import yaml
 
 from service import child_process
 from service.store.database import connect
 from service.store.venues import VenueRepository
 from testbed.homes import in_both_homes, in_one_home_first
-from testbed.running import DEADLINE_S, Service, venue, wait_for
+from testbed.running import DEADLINE_S, SIZE, Service, venue, wait_for
 from tests.e2e.routes.event_stream import followed
 from tests.worker.receiver import LOCAL, SECRET, Receiver
 
-RENDERER = Path(__file__).parents[3] / "docs" / "examples" / "renderer.py"
+EXAMPLES = Path(__file__).parents[3] / "docs" / "examples"
+RENDERER, MASKS = EXAMPLES / "renderer.py", EXAMPLES / "frigate_masks.py"
 
 
 @in_both_homes
@@ -235,3 +239,59 @@ def test_the_renderer_of_the_documents_ends_where_no_venue_is(service):
     ended = subprocess.run([sys.executable, "-I", "-S", RENDERER, service.url, "nowhere", "x"], capture_output=True)
     assert ended.returncode == 1
     assert b"There is no such venue" in ended.stderr
+
+
+FRIGATE = {
+    "mqtt": {"host": "10.1.0.2"},
+    "cameras": {
+        "left": {
+            "detect": {"width": 1280, "height": 720},
+            "zones": {"goal": {"coordinates": "0.4,0.5,0.6,0.5,0.6,0.7", "objects": ["person"], "inertia": 3}},
+            "motion": {"threshold": 30, "mask": ["0.2,0.1,0.4,0.1,0.4,0.3", "0.95,0.9,1,0.9,1,1"]},
+            "objects": {"track": ["person"], "filters": {"person": {"mask": "0.3,0.6,0.5,0.6,0.5,0.8"}}},
+        },
+        "street": {"zones": {"door": {"coordinates": ["0.1,0.1", "0.2,0.1", "0.2,0.3"]}}},
+    },
+}
+
+
+def test_zones_and_masks_of_frigate_follow_a_camera(service, name, tmp_path):
+    stored = venue(name)
+    service.http.put(f"/venues/{name}", json=stored).raise_for_status()
+    before = stored["cameras"][0]["pose"]["rotation"]
+    # 0.03 radians to the left about the camera's own y: what is ahead goes 1.8 px to the right.
+    turned = cv2.Rodrigues(np.array([0, 0.03, 0]))[0] @ cv2.Rodrigues(np.array(before))[0]
+    stored["cameras"][0]["pose"]["rotation"] = cv2.Rodrigues(turned)[0].ravel().tolist()
+    service.http.put(f"/venues/{name}", json=stored).raise_for_status()
+    (tmp_path / "drawn.yml").write_text(yaml.safe_dump(FRIGATE))
+    assert _masks_moved(tmp_path, service.url, name).returncode == 0
+    moved = yaml.safe_load((tmp_path / "config.yml").read_text())
+    left, drawn = moved["cameras"]["left"], FRIGATE["cameras"]["left"]
+    assert moved["cameras"]["street"] == FRIGATE["cameras"]["street"]
+    assert left["zones"]["goal"] | drawn["zones"]["goal"] == drawn["zones"]["goal"]
+    for now, then in [
+        (left["zones"]["goal"]["coordinates"], "0.4,0.5,0.6,0.5,0.6,0.7"),
+        (left["motion"]["mask"][0], "0.2,0.1,0.4,0.1,0.4,0.3"),
+        (left["objects"]["filters"]["person"]["mask"], "0.3,0.6,0.5,0.6,0.5,0.8"),
+    ]:
+        shift = np.subtract(*[np.array(polygon.split(","), float).reshape(-1, 2) for polygon in (now, then)])
+        np.testing.assert_allclose(shift * SIZE, [[1.8, 0]] * 3, atol=0.6)
+    assert max(map(float, left["motion"]["mask"][1].split(","))) == 1
+
+
+def test_zones_of_a_camera_that_turned_away_have_to_be_drawn_anew(service, name, tmp_path):
+    stored = venue(name)
+    service.http.put(f"/venues/{name}", json=stored).raise_for_status()
+    stored["cameras"][0]["pose"]["rotation"] = [-1.6, 0.1, -0.2]
+    service.http.put(f"/venues/{name}", json=stored).raise_for_status()
+    (tmp_path / "drawn.yml").write_text(yaml.safe_dump(FRIGATE))
+    ended = _masks_moved(tmp_path, service.url, name)
+    assert ended.returncode == 1
+    assert "left: " in ended.stderr
+    assert "drawn anew" in ended.stderr
+    assert not (tmp_path / "config.yml").exists()
+
+
+def _masks_moved(folder, url, name):
+    command = [sys.executable, MASKS, "drawn.yml", "1", "config.yml", url, name]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True)

@@ -2,6 +2,7 @@ import json
 import socket
 import time
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
 from threading import Semaphore
 
 import httpx
@@ -56,8 +57,8 @@ def test_a_venue_changed_meanwhile_keeps_its_new_poses(service, name):
 
 @in_both_homes
 def test_many_submissions_at_once_are_one_job(service, name):
-    service.venue(name, "accept 1")
-    with ThreadPoolExecutor(8) as pool:
+    service.venue(name)
+    with service.jobs_held(name), ThreadPoolExecutor(8) as pool:
         answers = list(pool.map(lambda _: service.submit(name), range(8)))
     assert sorted(answer.status_code for answer in answers) == [200] * 7 + [202]
     job = {answer.json()["id"] for answer in answers}
@@ -67,9 +68,9 @@ def test_many_submissions_at_once_are_one_job(service, name):
 
 @in_both_homes
 def test_a_key_that_comes_twice_at_once_is_one_job_whatever_came_with_it(service, name):
-    service.venue(name, "accept 1")
+    service.venue(name)
     key = {"Idempotency-Key": "k"}
-    with ThreadPoolExecutor(8) as pool:
+    with service.jobs_held(name), ThreadPoolExecutor(8) as pool:
         answers = list(pool.map(lambda number: service.submit(name, number % 2, headers=key), range(8)))
     assert sorted(answer.status_code for answer in answers) == [200] * 3 + [202] + [422] * 4
     refused = {answer.json()["type"] for answer in answers if answer.status_code == 422}
@@ -94,18 +95,25 @@ def test_but_no_longer_than_asked(service, name):
 
 
 def test_progress_is_shown(service, name):
-    job = service.submitted(service.venue(name, "accept 2"))
-    progress = wait_for(lambda: (p := service.job(job)["progress"]) and p["stage"] == "evolution" and p)
+    with service.jobs_held(name):
+        job = service.submitted(service.venue(name))
+        progress = wait_for(lambda: (p := service.job(job)["progress"]) and p["stage"] == "evolution" and p)
     assert progress == {"stage": "evolution", "fraction": 0.5, "generation": 7, "loss": 0.3}
     service.end(job)
 
 
 @in_both_homes
 def test_events_tell_the_progress_and_the_end(service, name):
-    job = service.submitted(service.venue(name, "accept 1"))
-    with service.http.stream("GET", f"/jobs/{job}/events") as answer:
-        assert answer.headers["content-type"].startswith("text/event-stream")
-        lines = [line.partition(": ") for line in answer.iter_lines()]
+    lines = []
+    with ExitStack() as held:
+        held.enter_context(service.jobs_held(name))
+        job = service.submitted(service.venue(name))
+        with service.http.stream("GET", f"/jobs/{job}/events") as answer:
+            assert answer.headers["content-type"].startswith("text/event-stream")
+            for line in answer.iter_lines():
+                lines.append(line.partition(": "))
+                if '"evolution"' in line:
+                    held.close()
     events = [value for field, _, value in lines if field == "event"]
     bodies = [json.loads(value) for field, _, value in lines if field == "data"]
     assert events[-1] == "end"

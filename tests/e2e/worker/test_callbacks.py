@@ -3,7 +3,6 @@
 import json
 import os
 import signal
-import threading
 from datetime import UTC, datetime
 
 import pytest
@@ -13,27 +12,14 @@ from service.settings import Settings
 from service.store import tables
 from testbed.running import wait_for
 from tests.e2e.commands import esc_here
-from tests.worker.receiver import LOCAL, SECRET, Receiver
+from tests.worker.receiver import LOCAL, SECRET, Holding
 from worker.duties import webhook_request
-
-
-class Holding(Receiver):
-    """Takes what comes, and answers when it is let go."""
-
-    def __init__(self) -> None:
-        self.go = threading.Event()
-        super().__init__()
-
-    def respond(self, request, status) -> None:
-        self.go.wait(60)
-        super().respond(request, status)
 
 
 @pytest.fixture
 def receiver():
     hook = Holding()
     yield hook
-    hook.go.set()
     hook.close()
 
 

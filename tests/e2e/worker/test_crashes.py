@@ -3,6 +3,7 @@
 import os
 import signal
 import time
+from contextlib import ExitStack
 
 import pytest
 
@@ -34,10 +35,11 @@ def poses(service, venue):
 
 def test_a_killed_worker_comes_back_and_its_job_ends_once(start):
     service = start().ready()
-    job = service.submitted(service.venue("v", "accept 2"))
-    service.running(job)
-    worker = service.worker()
-    os.kill(worker, signal.SIGKILL)
+    with service.jobs_held("v"):
+        job = service.submitted(service.venue("v"))
+        service.running(job)
+        worker = service.worker()
+        os.kill(worker, signal.SIGKILL)
     ended = service.end(job)
     assert (ended["status"], ended["attempt"]) == ("succeeded", 2)
     # The first attempt died with its worker, and the pose moved by one step, not two.
@@ -53,17 +55,17 @@ def test_a_killed_worker_comes_back_and_its_job_ends_once(start):
 def test_a_worker_on_another_machine_takes_over(start, worker_beside):
     silence_s = 3
     service = start("serve", ESC_TAKEOVER_AFTER_S=str(silence_s))
-    service.venue("v", "accept 3")
     workers = [worker_beside(service, f"worker-{number}") for number in (1, 2)]
     service.ready()
-    job = service.submitted("v")
-    service.running(job)
-    (doomed,) = (worker for worker in workers if children(worker.pid))
-    (computing,) = children(doomed.pid)
-    doomed.kill()
-    killed = time.monotonic()
-    wait_for(lambda: service.job(job)["attempt"] == 2)
-    assert time.monotonic() - killed < silence_s + TAKING_OVER_S
+    with service.jobs_held("v"):
+        job = service.submitted(service.venue("v"))
+        service.running(job)
+        (doomed,) = (worker for worker in workers if children(worker.pid))
+        (computing,) = children(doomed.pid)
+        doomed.kill()
+        killed = time.monotonic()
+        wait_for(lambda: service.job(job)["attempt"] == 2)
+        assert time.monotonic() - killed < silence_s + TAKING_OVER_S
     assert not alive(computing)
     ended = service.end(job)
     assert (ended["status"], ended["attempt"]) == ("succeeded", 2)
@@ -150,10 +152,12 @@ def test_a_program_and_a_network_that_are_not_there_are_told(start):
 def test_while_the_database_is_away_the_service_says_so_and_a_job_goes_on(start, home):
     # Without a key to look up: otherwise it could not tell whether the caller may know.
     service = start("up", ESC_AUTH="off").ready()
-    job = service.submitted(service.venue("v", "accept 1"))
-    service.running(job)
-    (computing,) = service.begun(job)
-    with home.database_away(service.data):
+    with ExitStack() as away:
+        with service.jobs_held("v"):
+            job = service.submitted(service.venue("v"))
+            service.running(job)
+            (computing,) = service.begun(job)
+            away.enter_context(home.database_away(service.data))
         wait_for(lambda: not alive(computing))
         wait_for(lambda: "the database is away, trying again" in (service.data / "log").read_text())
         assert service.http.get(f"/jobs/{job}").status_code == 503
@@ -215,12 +219,11 @@ def test_a_disk_without_a_byte_left_stops_nobody_for_longer_than_that(small_disk
     worker = service.worker()
     service.venue("v")
     service.venue("w")
-    hold = service.data / "hold"
-    hold.touch()
-    job = service.submitted("v")
-    service.running(job)
-    with filled(small_disk):
-        hold.unlink()
+    with ExitStack() as full:
+        with service.jobs_held("v"):
+            job = service.submitted("v")
+            service.running(job)
+            full.enter_context(filled(small_disk))
         # No room for a sign of life either.
         wait_for(lambda: service.http.get("/readyz").json()["parts"]["worker"] != "ok")
         answer = service.submit("w")

@@ -2,6 +2,7 @@
 
 import time
 
+import pytest
 import sqlalchemy as sa
 
 from testbed.homes import on_servers
@@ -14,6 +15,7 @@ A_JOB_S = 2
 PER_JOB = 20
 
 
+@pytest.mark.long
 @on_servers
 def test_an_idle_service_asks_little_of_its_database_and_a_job_not_much(start, home, postgres, tmp_path):
     url = sa.make_url(home.database_url(tmp_path / "esc"))

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import typer
 
+from models.training.pitches.render import Conditions, render_frame
 from service.cli.check import check
 from service.formats.conversion import members_of, write_cameras
 from service.formats.reading import read_paths
@@ -60,6 +61,7 @@ def run(tmp_path, frames, cameras, form, capsys, **options):
     return ended.value.exit_code, json.loads(printed.out), printed.err
 
 
+@pytest.mark.long
 def test_true_cameras_are_good(tmp_path, frames, capsys):
     code, answer, _ = run(tmp_path, frames, records(), "colmap", capsys)
     assert (code, answer["grade"], answer["format"]) == (0, "good", "colmap")
@@ -85,6 +87,23 @@ def test_centimetres_and_a_turn_are_told_and_corrected(tmp_path, frames, capsys)
         assert math.dist(found.pose.position, true.pose.position) < 0.2
 
 
+def test_coefficients_in_another_order_are_told_and_not_taken_for_a_turn(tmp_path, frames, capsys):
+    lens = rendered_pair.cameras()[0].intrinsics
+    k1, k2, p1, p2, k3 = bent = [-0.3, 0.1, 0.002, -0.001, -0.02]
+    true = replace(rendered_pair.cameras()[0], intrinsics=replace(lens, distortion=np.array(bent)))
+    frame = render_frame(rendered_pair.PITCH, true, Conditions.fair(22), np.random.default_rng(0)).frame
+    (tmp_path / "left.jpg").write_bytes(rendered_pair.encoded(frame))
+    (tmp_path / "site.json").write_bytes((frames / "site.json").read_bytes())
+    written = records()[0].intrinsics.model_copy(update={"distortion": [k1, k2, k3, p1, p2]})
+    cameras = [replace(records()[0], intrinsics=written)]
+    code, answer, _ = run(tmp_path, tmp_path, cameras, "mrcal", capsys)
+    assert (code, answer["grade"]) == (3, "wrong")
+    (camera,) = answer["cameras"]
+    assert [cause["cause"] for cause in camera["causes"]] == ["distortion-order"]
+    assert camera["off_px"] < 2
+
+
+@pytest.mark.long
 def test_a_frame_in_the_dark_tells_nothing(tmp_path, frames, capsys):
     dark = tmp_path / "dark"
     dark.mkdir()

@@ -13,6 +13,9 @@ import pytest
 
 from service.formats import colmap, freed, metropolis, mrcal, opencv, opentrackio, plain, pose2sim, soccernet
 from service.formats.lens import NumberedCamera
+from service.formats.parsing import parse_file
+from service.formats.table import FILE_FORMATS
+from service.schemas.names import PANORAMAS
 from service.schemas.problems import Problem
 from service.schemas.venue import Camera
 from tests.service.formats.cameras import (
@@ -415,3 +418,16 @@ def test_a_fisheye_is_refused_by_formats_that_know_no_such_lens(write):
     with pytest.raises(Problem, match="json and st-map hold every lens") as refused:
         write(fisheye)
     assert refused.value.kind == "format-cannot-hold"
+
+
+@pytest.mark.parametrize("model", PANORAMAS)
+@pytest.mark.parametrize("name", sorted(set(FILE_FORMATS) - {"json"}))
+def test_a_panorama_is_refused_by_every_format_of_camera_lenses(name, model):
+    plain = shot()
+    lens = plain.camera.intrinsics.model_copy(update={"model": model})
+    panorama = NumberedCamera(plain.camera.model_copy(update={"intrinsics": lens}), 1)
+    with pytest.raises(Problem, match=f"{name} has no place for the {model} panorama of camera camera-1; json and st"):
+        FILE_FORMATS[name].document([panorama])
+    written = FILE_FORMATS["json"]
+    (read,) = written.reader.read([parse_file("venue.json", written.document([panorama]).content)])
+    assert read.numbered(1).camera.intrinsics.model == model

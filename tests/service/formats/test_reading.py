@@ -4,6 +4,7 @@ import json
 import tomllib
 import zipfile
 from dataclasses import replace
+from itertools import permutations
 
 import numpy as np
 import pytest
@@ -19,7 +20,7 @@ from service.formats.rotations import matrix_of, vector_of
 from service.formats.table import FILE_FORMATS
 from service.schemas.geometry import Intrinsics, LensFile, Pose
 from service.schemas.problems import Problem
-from worker.calibration.geometry.lens import LENSES
+from worker.calibration.geometry.lens_models import LENSES
 
 WITH_FISHEYE = ("json", "opencv", "colmap", "caliscope", "kalibr", "ros", "nerf")
 WITHOUT_POSE = ("ros",)
@@ -32,6 +33,8 @@ LOST = {
     "soccernet": {"the picture size"},
     "ros": {"the pose"},
 }
+# All of a camera with k1, k2, p1 and p2 but its name.
+WHOLE = ("json", "opencv", "opentrackio", "colmap", "soccernet", "pose2sim", "caliscope", "mrcal", "nerf")
 numbers = st.floats(-1.0, 1.0, allow_subnormal=False)
 
 
@@ -63,6 +66,11 @@ def written(form, records):
     return members_of(write_cameras(records, form), "left")
 
 
+def reread(form, records):
+    files = written(form, records)
+    return read_files(files, is_optional(files)).cameras
+
+
 def is_optional(files):
     return frozenset(name for name in files if "points3D" in name)
 
@@ -92,6 +100,30 @@ def test_what_a_format_holds_is_read_back_to_a_billionth(form, records):
             rotations = [matrix_of(one.pose.rotation) for one in (before, after)]
             np.testing.assert_allclose(*rotations, atol=1e-9)
             np.testing.assert_allclose(after.pose.position, before.pose.position, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize(("form", "through"), list(permutations(WHOLE, 2)))
+@given(cameras())
+@settings(max_examples=2, deadline=None)
+def test_a_calibration_comes_back_from_any_format_that_holds_all_of_it(form, through, records):
+    # SoccerNet's readers take the picture to be twice as large as the principal point says.
+    records = [with_centre_in_the_middle(one) for one in records]
+    before = reread(form, records)
+    back = reread(form, reread(through, before))
+    for one, again in zip(before, back, strict=True):
+        assert again.size == one.size
+        np.testing.assert_allclose(again.intrinsics.matrix, one.intrinsics.matrix, rtol=1e-12)
+        lenses = [[*lens.distortion, *[0.0] * 14][:14] for lens in (one.intrinsics, again.intrinsics)]
+        np.testing.assert_allclose(*lenses, rtol=0, atol=1e-9)
+        np.testing.assert_allclose(*(matrix_of(each.pose.rotation) for each in (one, again)), rtol=0, atol=1e-9)
+        np.testing.assert_allclose(again.pose.position, one.pose.position, rtol=0, atol=1e-9)
+
+
+def with_centre_in_the_middle(camera):
+    (fx, skew, _), (_, fy, _), last = camera.intrinsics.matrix
+    width, height = camera.size
+    matrix = [[fx, skew, width / 2], [0.0, fy, height / 2], last]
+    return replace(camera, intrinsics=camera.intrinsics.model_copy(update={"matrix": matrix}))
 
 
 @pytest.mark.parametrize("form", WITH_FISHEYE)

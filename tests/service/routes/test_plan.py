@@ -27,6 +27,7 @@ def test_a_plan_has_numbers_maps_and_pictures_and_stores_nothing(service):
     assert service.http.get("/venues").json()["venues"] == before
 
 
+@pytest.mark.long
 def test_covered_lines_and_worn_ones_make_a_plan_worse(service):
     clean, poor = (
         service.http.post("/plan", params=asked, json=SITE).json()["plan"]

@@ -117,7 +117,7 @@ def test_long_values_and_names_are_told_in_short():
 
 def test_a_document_of_many_wrong_names_is_told_at_once():
     document = VENUE_EXAMPLE | {f"camera{'s' * 2000}{number}": 1 for number in range(400)}
-    begun = time.perf_counter()
+    begun = time.process_time()
     told = wrong(VenueIn, document)
     assert len(told) == 400
-    assert time.perf_counter() - begun < 1
+    assert time.process_time() - begun < 1

@@ -4,6 +4,7 @@ import pytest
 from pydantic import ValidationError
 
 from service.schemas.geometry import Intrinsics, Pose, PoseIn
+from service.schemas.names import PANORAMAS
 from service.schemas.venue import VENUE_EXAMPLE
 
 
@@ -51,6 +52,19 @@ def test_a_fisheye_has_no_distortion_or_four_numbers(length, taken):
     else:
         with pytest.raises(ValidationError, match="must have 0 or 4 numbers with the model fisheye"):
             Intrinsics.model_validate(document)
+
+
+@pytest.mark.parametrize("model", PANORAMAS)
+def test_a_panorama_has_no_distortion_no_skew_and_a_sigma_of_its_matrix_alone(model):
+    lens = {"model": model, "matrix": [[1222.0, 0, 1919.5], [0, 1260.0, 40.0], [0, 0, 1]], "distortion": []}
+    assert Intrinsics.model_validate(lens | {"sigma": {"fx": 4.0, "cy": 2.0, "aspect": 0.01}}).panorama == model
+    for change, why in (
+        ({"distortion": [0.1, 0, 0, 0]}, f"distortion must have 0 numbers with the model {model}"),
+        ({"matrix": [[1222.0, 2.0, 1919.5], *lens["matrix"][1:]]}, f"skew must be 0 with the model {model}, came 2"),
+        ({"sigma": {"k1": 0.01}}, f"sigma has k1: with the model {model} it takes fx, fy, aspect, cx, cy \\["),
+    ):
+        with pytest.raises(ValidationError, match=why):
+            Intrinsics.model_validate(lens | change)
 
 
 MATRIX = VENUE_EXAMPLE["cameras"][0]["intrinsics"]["matrix"]

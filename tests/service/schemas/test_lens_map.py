@@ -4,6 +4,7 @@ import re
 import warnings
 from pathlib import Path
 from types import SimpleNamespace
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from service.intake.pose_warnings import warnings_of
 from service.schemas.find import SoughtSite
 from service.schemas.geometry import DISTORTION_LENGTHS, Intrinsics
 from service.schemas.lens_map import lens_doubts, lens_warnings, map_of
+from service.schemas.names import LensModel
 from service.schemas.options import FindOptions
 from service.schemas.venue import VENUE_EXAMPLE, CameraIn, VenueIn
 from worker.jobs.from_schemas import lens_of
@@ -52,6 +54,9 @@ def camera(matrix, distortion, size, model="opencv", sigma=True):
         (camera(matrix(1500, 959.5, 539.5), [-0.1, 0.02, 0, 0, 0], HD), []),
         (camera(matrix(800, 959.5, 539.5), [-0.02, 0, 0, 0], HD, "fisheye"), []),
         (camera(matrix(1500, 959.5, 539.5), TILTED, HD), []),
+        (camera(matrix(611, 959.5, 20.5, 650), [], HD, "cylindrical"), []),
+        (camera(matrix(611, 959.5, 20.5), [], HD, "cylindrical", sigma=None), ["known to 3 % of the focal"]),
+        (camera(matrix(250, 959.5, 539.5), [], HD, "equirectangular"), [r"no ray for 42 % of the picture"]),
         (camera(matrix(20000, 959.5, 539.5), [0.2, -7, 0, 0, -1450], HD), []),
         # Anamorphic within what a fit leaves, and a lens that was shifted.
         (camera(matrix(1500, 959.5, 539.5, 1525), [], HD), []),
@@ -114,7 +119,7 @@ NUMBERS = st.one_of(st.floats(-1e308, 1e308), st.floats(-1e15, 1e15), st.floats(
 
 @st.composite
 def lenses(draw):
-    model = draw(st.sampled_from(["opencv", "fisheye"]))
+    model = draw(st.sampled_from(get_args(LensModel)))
     length = draw(st.sampled_from(DISTORTION_LENGTHS[model]))
     focal, skew = draw(st.floats(192, 3e5)), draw(st.one_of(st.just(0.0), NUMBERS))
     return {

@@ -1,10 +1,14 @@
 """What the service says a camera moved, against the engine."""
 
+from typing import get_args
+
+import cv2
 import numpy as np
 import pytest
 
 from service.schemas.field import FieldOfPlay
 from service.schemas.geometry import Intrinsics, Pose, PosedCamera
+from service.schemas.names import PANORAMAS, LensModel
 from service.store import movement
 from worker.calibration.gate.quality import Moved
 from worker.jobs.from_schemas import camera_of, pitch_of
@@ -18,6 +22,8 @@ LENSES = {
     "thin prism": [-0.2, 0.05, 0.001, 0.001, 0, 0, 0, 0, 0.004, -0.002, 0.003, 0.001],
     "tilted": [-0.2, 0.05, 0.001, 0.001, 0, 0, 0, 0, 0, 0, 0, 0, 0.03, -0.02],
     "fisheye": [0.02, -0.003, 0.001, -0.0002],
+    "cylindrical": [],
+    "equirectangular": [],
 }
 
 
@@ -27,8 +33,8 @@ def camera(lens="barrel", turned=(0, 0, 0), by=(0, 0, 0), skew=0.0) -> PosedCame
         id="left",
         image_size=[3072, 1728],
         intrinsics=Intrinsics(
-            model="fisheye" if lens == "fisheye" else "opencv",
-            matrix=[[2122.4, skew, 1634.8], [0, 2122.4, 877.7], [0, 0, 1]],
+            model=lens if lens in get_args(LensModel) else "opencv",
+            matrix=[[2122.4, 0.0 if lens in PANORAMAS else skew, 1634.8], [0, 2122.4, 877.7], [0, 0, 1]],
             distortion=LENSES[lens],
         ),
         pose=Pose.from_position(rotation.tolist(), position.tolist()),
@@ -44,7 +50,7 @@ def test_points_of_the_pitch_are_where_the_engine_has_them(lens, skew):
     np.testing.assert_allclose(movement.pixels(shot, points), expected, atol=1e-6)
 
 
-@pytest.mark.parametrize("lens", ["none", "barrel", "fisheye"])
+@pytest.mark.parametrize("lens", ["none", "barrel", "fisheye", "cylindrical"])
 @pytest.mark.parametrize(
     ("turned", "by"), [((0.001, 0, 0), (0, 0, 0)), ((0.004, -0.006, 0.002), (0.05, 0.1, -0.02)), ((0, 0, 0), (0, 0, 0))]
 )
@@ -95,6 +101,22 @@ def test_a_camera_that_stands_still_has_a_picture_that_stands_still():
     motion = movement.picture_motion(FIELD, camera(), camera())
     for name in ("ground", "far"):
         np.testing.assert_allclose(motion[name], np.eye(3), atol=1e-6)
+
+
+@pytest.mark.parametrize("lens", ["none", "barrel", "fisheye"])
+def test_a_camera_that_turned_away_shows_nothing_of_its_old_picture(lens):
+    away = camera(lens)
+    turned = cv2.Rodrigues(np.array([0, np.pi, 0]))[0] @ cv2.Rodrigues(np.array(away.pose.rotation))[0]
+    pose = Pose.from_position(cv2.Rodrigues(turned)[0].ravel().tolist(), away.pose.position)
+    motion = movement.picture_motion(FIELD, away, away.model_copy(update={"pose": pose}))
+    assert set(motion.values()) == {None}
+
+
+def test_a_picture_that_shows_a_strip_of_the_old_one_has_its_motion():
+    before, after = camera("none"), camera("none", turned=(0, -1.0, 0))
+    motion = movement.picture_motion(FIELD, before, after)
+    assert motion["far"] is not None
+    assert motion["far_residual_px"] < 1e-3
 
 
 def test_a_camera_that_looks_at_the_sky_has_no_ground():

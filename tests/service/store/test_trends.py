@@ -136,11 +136,11 @@ def test_a_jump_on_the_day_of_the_anchor_counts_in_full_and_one_within_its_sigma
 
 
 def test_a_quiet_camera_is_said_to_be_quiet(stock):
-    nights(stock, 40, AUTUMN, noisy(5))
+    nights(stock, 24, AUTUMN, noisy(5))
     found = trend(stock)
     assert (found.state, found.baseline_nights) == ("quiet", 20)
     assert found.words == (
-        "Camera left has not moved beyond what its own spread explains since 1 September 2026 (40 nights)."
+        "Camera left has not moved beyond what its own spread explains since 1 September 2026 (24 nights)."
     )
     assert not any(chart.beyond for point in found.points for chart in point.charts)
 
@@ -148,13 +148,13 @@ def test_a_quiet_camera_is_said_to_be_quiet(stock):
 def test_a_step_is_told_with_its_size_and_its_day_and_rings_where_it_matters(stock):
     venue = stock.venue("v")
     stock.venues.put(venue.model_copy(update={"alarms": Alarms(trend_m=0.03)}))
-    nights(stock, 40, AUTUMN, noisy(1, lambda number: 0.045 if number >= 30 else 0.0))
+    nights(stock, 34, AUTUMN, noisy(1, lambda number: 0.045 if number >= 22 else 0.0))
     found = trend(stock)
     assert found.state == "alarm"
     assert found.moved_m == pytest.approx(0.045, abs=1.5 * SIGMA_M)
-    assert "at the far touchline since 1 October 2026" in found.words
+    assert "at the far touchline since 23 September 2026" in found.words
     assert found.words.endswith("beyond what its own spread explains (EWMA and CUSUM).")
-    assert [point.state for point in found.points[:30]] == ["too-few-nights"] * 3 + ["quiet"] * 27
+    assert [point.state for point in found.points[:22]] == ["too-few-nights"] * 3 + ["quiet"] * 19
     alarms = stock.venues.health("v").alarms
     assert [(alarm.rule, alarm.camera) for alarm in alarms] == [("trend", "left"), ("trend", "right")]
     assert alarms[0].why == found.words
@@ -170,23 +170,23 @@ def test_a_shift_that_is_sure_but_small_drifts_and_rings_nothing(stock):
 
 
 def test_a_focal_length_that_creeps_is_named_with_what_it_moves(stock):
-    nights(stock, 60, AUTUMN, noisy(2, focal=lambda number: 5e-5 * max(0, number - 20)))
+    nights(stock, 36, AUTUMN, noisy(2, focal=lambda number: 2e-4 * max(0, number - 24)))
     found = trend(stock)
     assert found.state == "alarm"
-    assert found.words.startswith("Camera left has a focal length 0.21% longer since 2")
-    assert " September 2026, 12." in found.words
+    assert found.words.startswith("Camera left has a focal length 0.18% longer since 2")
+    assert " September 2026, 10." in found.words
     assert "moved" not in found.words
 
 
 @in_both_homes
 def test_many_jobs_of_one_day_are_one_night(stock):
-    def every_two_hours(number):
+    def every_six_hours(number):
         return displacement(0.0 if number == 0 else 0.01 * (number % 2))
 
-    for number in range(24):
-        night(stock, every_two_hours(number), at=AUTUMN.replace(hour=0) + timedelta(hours=2 * number))
+    for number in range(8):
+        night(stock, every_six_hours(number), at=AUTUMN.replace(hour=0) + timedelta(hours=6 * number))
     first, second = trend(stock).points
-    assert (first.jobs, second.jobs) == (12, 12)
+    assert (first.jobs, second.jobs) == (4, 4)
     assert second.across_m == pytest.approx(0.005)
 
 

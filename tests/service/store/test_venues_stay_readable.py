@@ -147,7 +147,7 @@ class Venues(RuleBasedStateMachine):
 @in_one_home_first
 def test_a_venue_stays_readable(stock, home):
     stays = settings(
-        max_examples=5 if isinstance(home, Embedded) else 12,
+        max_examples=3 if isinstance(home, Embedded) else 12,
         stateful_step_count=12,
         suppress_health_check=list(HealthCheck),
         derandomize=True,

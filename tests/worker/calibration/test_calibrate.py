@@ -92,11 +92,13 @@ def test_stored_poses_that_all_look_at_the_sky_are_an_error_that_names_each_came
     assert "the stored pose of camera right sees" in str(caught.value)
 
 
-def test_reasons_that_end_with_a_full_stop_are_joined_without_it():
-    dark = {name: (np.zeros_like(several[0]),) for name, several in frames().items()}
-    reasons = run(pictures=dark).rejected_because
-    assert "; camera right: Dark" in reasons
-    assert ".;" not in reasons
+def test_where_no_frame_can_be_used_nothing_is_searched_and_each_camera_is_refused_with_its_reason():
+    found = run(pictures={name: (np.zeros_like(several[0]),) for name, several in frames().items()})
+    assert (found.verdict, found.generations) == ("rejected", 0)
+    assert [one.moved.position_m for one in found.cameras] == [0.0] * 2
+    assert found.stitch_error_px is None
+    assert "; camera right: Dark" in found.rejected_because
+    assert ".;" not in found.rejected_because
 
 
 @pytest.mark.long
@@ -141,6 +143,7 @@ def test_a_focal_length_that_heat_has_changed_is_found_when_asked_for():
     assert found.cameras[0].camera.intrinsics.matrix[0, 0] == pytest.approx(600.0, abs=0.3)
 
 
+@pytest.mark.long
 def test_a_lens_that_is_not_the_one_that_was_given_is_suspected_with_its_numbers():
     left, right = in_wind()
     other = replace(left.intrinsics, distortion=left.intrinsics.distortion + [0.02, 0, 0, 0, 0])

@@ -132,6 +132,7 @@ def asked_of_network(frames, **options) -> tuple[Calibration, list[tuple[int, in
     return calibrate(CROWNED, stored, by_id, watched, Options(seed=5, **options)), shown
 
 
+@pytest.mark.long
 def test_the_network_sees_no_more_than_overviews_where_lines_suffice():
     found, shown = asked_of_network(pair_frames())
     assert (found.path, found.verdict, found.in_full) == ("near", "accepted", [])
@@ -160,6 +161,7 @@ def test_the_network_looks_in_full_where_an_overview_shows_most_lines_elsewhere(
     assert found.in_full == ["left"]
 
 
+@pytest.mark.long
 def test_nobody_is_told_of_looking_nearby_in_vain():
     steps = []
     started = [moved(one, *STORM) for one in pair()]

@@ -68,6 +68,7 @@ def test_of_several_frames_the_paint_is_seen_in_one():
     assert off_px(result) < 0.5
 
 
+@pytest.mark.long
 def test_a_camera_that_stands_where_it_stood_needs_no_search():
     found = found_nearby()
     assert (found.path, found.generations, found.in_full) == ("near", 0, [])
@@ -75,6 +76,7 @@ def test_a_camera_that_stands_where_it_stood_needs_no_search():
     assert off_px(found.cameras[0]) < 0.5
 
 
+@pytest.mark.long
 def test_the_lines_of_the_others_are_none_that_nobody_expects():
     assert found_nearby().cameras[0].overlap.unexpected < 0.2
 
@@ -115,6 +117,7 @@ def test_a_camera_without_a_pose_is_found_by_the_lines_of_its_own_sport():
     assert min(best.distance_m(CAMERA), other.distance_m(CAMERA)) < 0.03
 
 
+@pytest.mark.long
 def test_without_a_pose_the_paint_of_the_field_is_the_one_whose_lines_a_camera_explains():
     drawn = draw_field_paint(FieldMap.of(NETBALL), ON_ITS_STAND, frame(), Segmenter(MODEL_PATH, 1), 0)
     is_red = paint_markings(NETBALL, CAMERA) > 0.8

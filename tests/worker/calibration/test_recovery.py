@@ -224,6 +224,7 @@ def test_an_upside_down_frame_is_neither_accepted_nor_proposed():
     assert (found.accepted, found.knocked) == (False, False)
 
 
+@pytest.mark.long
 def test_a_request_to_stop_ends_a_search_anywhere(monkeypatch):
     asked = []
 
@@ -333,6 +334,7 @@ def test_a_camera_is_lost_by_its_lines_or_by_having_moved_too_far_since_last_nig
     assert recovery._is_lost(result) == is_lost
 
 
+@pytest.mark.long
 def test_a_camera_that_was_knocked_in_the_dusk_is_found_where_noise_does_not_hide_its_lines():
     left, _ = pair()
     stored = turned(left, TURNED_DEG)

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from testbed.parameters import try_first
 from testbed.synthetic import CROWNED, pair, pair_frames
 from worker.calibration import steps
 from worker.calibration.detection.contrast import Channels
@@ -35,7 +34,8 @@ def refined_as_in_a_job(begun):
     return found
 
 
-@pytest.mark.parametrize(("turned_deg", "moved_m", "agreement"), try_first(BESIDE_LINES))
+@pytest.mark.long
+@pytest.mark.parametrize(("turned_deg", "moved_m", "agreement"), BESIDE_LINES)
 def test_lines_beside_which_a_finish_ended_are_found_from_there(turned_deg, moved_m, agreement):
     left = pair()[0]
     begun = displaced(left, turned_deg, moved_m)

@@ -65,6 +65,7 @@ def test_a_camera_that_was_turned_to_where_its_neighbour_looks_is_not_called_the
     assert found.cameras[1].accepted
 
 
+@pytest.mark.long
 def test_cameras_of_other_frame_sizes_are_not_compared():
     left, _ = outdated()
     small = camera("right", (1.0, -48.0, 10.0), (20.0, 0.0), focal=400, size=(640, 360))

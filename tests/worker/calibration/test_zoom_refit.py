@@ -95,6 +95,7 @@ def test_the_neighbours_of_a_camera_that_zoomed_are_finished_without_it(monkeypa
     assert finished[-1] == ["beside"]
 
 
+@pytest.mark.long
 def test_a_camera_that_moved_has_not_zoomed():
     far = moved(plane(), (0.006, -0.008, 0.004), (0.15, 0.1, -0.1))
     options = Options(seed=1, generations=60, lens_may_drift=True)
@@ -104,6 +105,7 @@ def test_a_camera_that_moved_has_not_zoomed():
     assert off_m(found) < 3 * found.cameras[0].sigma.position_m
 
 
+@pytest.mark.long
 def test_a_lens_known_to_be_uncertain_is_not_called_zoomed():
     unsure = believed(0.004)
     unsure = replace(unsure, intrinsics=replace(unsure.intrinsics, sigma={"fx": 10.0}))

@@ -16,7 +16,7 @@ from testbed.homes import in_both_homes
 from testbed.stock import Stock
 from worker.duties.retention import AT_ONCE, FOLDERS_OF_A_JOB, TRY_AGAIN_AFTER, Retention
 
-pytestmark = [pytest.mark.slow, in_both_homes]
+pytestmark = pytest.mark.slow
 NOW = datetime(2026, 11, 21, 10, tzinfo=UTC)
 
 
@@ -35,6 +35,7 @@ def retention(stock, forgotten):
     return Retention(stock.settings, stock.expiry, stock.blobs, stock.workers, forgotten.extend)
 
 
+@in_both_homes
 def test_frames_go_after_two_days_and_pictures_after_two_weeks(stock, retention):
     failed = stock.ended("a", ago(days=3), accepted=None)
     old, older = (stock.ended("a", ago(days=days), accepted=False) for days in (3, 15))
@@ -44,6 +45,7 @@ def test_frames_go_after_two_days_and_pictures_after_two_weeks(stock, retention)
     assert {job.id for job in stock.jobs.page(JobPage(10, venue="a")).jobs} == {failed, old, older, young}
 
 
+@in_both_homes
 def test_frames_of_pictures_that_nobody_has_looked_at_stay_as_long_as_pictures(stock, retention):
     unseen, old = (stock.ended("a", ago(days=days), accepted=False, drawn=False) for days in (3, 15))
     retention.round(NOW)
@@ -99,6 +101,7 @@ def test_a_job_with_deleted_pictures_links_to_none(stock, retention):
     assert stock.jobs.pictures(job).deleted
 
 
+@in_both_homes
 def test_jobs_go_after_400_days_and_the_queue_forgets_them(stock, retention, forgotten):
     job = stock.ended("a", ago(days=401), accepted=False)
     retention.round(NOW)
@@ -107,6 +110,7 @@ def test_jobs_go_after_400_days_and_the_queue_forgets_them(stock, retention, for
     assert stock.files() == set()
 
 
+@in_both_homes
 def test_the_last_accepted_job_of_each_venue_stays_with_its_pictures(stock, retention):
     before, last = stock.ended("a", ago(days=501)), stock.ended("a", ago(days=500))
     rejected = stock.ended("a", ago(days=499), accepted=False)
@@ -133,6 +137,7 @@ def test_open_jobs_are_never_touched_however_old(stock, retention, forgotten):
     assert forgotten == []
 
 
+@in_both_homes
 def test_frames_of_an_upload_that_became_no_job_go_after_their_grace(stock, retention):
     grace, submission = timedelta(hours=1), stock.submission("v")
     assert stock.submissions.announce(submission, 100, grace) is None
@@ -143,6 +148,7 @@ def test_frames_of_an_upload_that_became_no_job_go_after_their_grace(stock, rete
     assert stock.files() == set()
 
 
+@in_both_homes
 def test_a_round_is_bounded_and_says_that_there_is_more(stock, retention, monkeypatch):
     monkeypatch.setattr("worker.duties.retention.BATCH", 2)
     newest_first = [stock.ended("a", ago(days=3 + n), accepted=None) for n in range(3)]
@@ -223,6 +229,7 @@ def test_a_round_deletes_all_that_as_many_jobs_leave_and_many_at_once(stock, ret
     assert stock.files() == set()
 
 
+@in_both_homes
 def test_of_several_workers_one_tidies(stock, retention):
     job = stock.ended("a", ago(days=3), accepted=None)
     stock.workers.register("another", None)
@@ -234,6 +241,7 @@ def test_of_several_workers_one_tidies(stock, retention):
     assert stock.files() == set()
 
 
+@in_both_homes
 def test_two_rounds_at_once_do_no_harm(stock, retention):
     for days in (3, 15, 401):
         stock.ended("a", ago(days=days), accepted=False)
@@ -274,6 +282,7 @@ def test_a_full_disk_does_not_wait_for_the_next_round(home, tmp_path, forgotten)
     stock.engine.dispose()
 
 
+@in_both_homes
 def test_poses_that_calibrations_brought_go_after_years_and_what_people_did_stays(stock, retention):
     for _ in range(4):
         stock.calibrated("a")
@@ -303,6 +312,7 @@ def numbers(stock, venue):
     return [revision.revision for revision in stock.venues.history(venue, None, 100)]
 
 
+@in_both_homes
 def test_callbacks_that_were_not_delivered_expire_by_their_age_however_seldom_they_were_tried(stock, retention):
     url = "https://hangs.example/"
     old, tried, young = (stock.ended("v", ago(days=days), accepted=False, callback_url=url) for days in (2.1, 2.1, 1.9))
@@ -319,6 +329,7 @@ def test_callbacks_that_were_not_delivered_expire_by_their_age_however_seldom_th
         assert counters.read(connection)["callbacks", ("expired",)] == 2
 
 
+@in_both_homes
 def test_deliveries_of_events_expire_in_batches_and_leave_no_row(stock, retention, monkeypatch):
     monkeypatch.setattr("worker.duties.retention.EVENTS", 3)
     hook = Webhook(url="https://hangs.example/told", events=["poses.changed"])

@@ -232,6 +232,7 @@ def test_the_outcome_is_what_was_found_with_pictures_and_provenance(venue, files
     assert all(file.startswith(begins[picture_file(name)[-4:]]) for name, file in outcome.pictures.items())
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("drawn")
 def test_only_the_pictures_are_drawn_that_are_named(venue, files, means):
     for names in (["preview", "overlay_left"], ["preview_before"], ["seam"]):

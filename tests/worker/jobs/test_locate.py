@@ -7,7 +7,6 @@ from fields.landmarks import UnknownLandmark
 from service.schemas import geometry
 from service.schemas.field import FieldOfPlay
 from service.schemas.options import ClickedPoint
-from testbed.parameters import try_first
 from tests.worker.calibration.onboarding.test_first_pose import NAMED
 from worker.calibration.geometry.camera import Camera, Pose, inside
 from worker.calibration.geometry.lens import Intrinsics
@@ -50,7 +49,8 @@ def located(lenses, points, stored=None):
 ONE, OTHERS = lens(1250), {"another focal length": lens(1310), "twice the size": lens(2500, (3840, 2160))}
 
 
-@pytest.mark.parametrize("other", try_first(OTHERS.values()), ids=OTHERS)
+@pytest.mark.long
+@pytest.mark.parametrize("other", OTHERS.values(), ids=OTHERS)
 def test_points_exchanged_between_cameras_of_other_lenses_are_refused_as_such(other):
     found = located({"left": ONE, "right": other}, {"left": clicked(other, RIGHT, 1), "right": clicked(ONE, LEFT, 2)})
     for end in found.values():
@@ -69,6 +69,7 @@ def test_of_three_cameras_the_two_that_were_exchanged_are_named():
     assert {name: end.accepted for name, end in found.items()} == {"left": False, "right": False, "middle": True}
 
 
+@pytest.mark.long
 def test_a_lens_that_was_measured_badly_is_no_exchange():
     found = located(
         {"left": lens(1190, centre=(90, -70)), "right": lens(1400)},

@@ -17,12 +17,12 @@ from worker.protocol import JobRequest, Message
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(sys.platform != "linux", reason="the limit is one of Linux")]
 
-MOST_MB = 800
+MOST_MB = 400
 
 
 def test_frames_that_need_more_memory_than_a_job_may_take_end_it_in_words():
-    """Eight frames of 64 million pixels of each of four cameras: less than 3 MB of files, 6 GB of pixels."""
-    large = np.full((8000, 8000), 120, np.uint8)
+    """Eight frames of 25 million pixels of each of four cameras: less than 2 MB of files, 2.4 GB of pixels."""
+    large = np.full((5000, 5000), 120, np.uint8)
     files = dict.fromkeys(("a", "b", "c", "d"), [cv2.imencode(".png", large)[1].tobytes()] * 8)
     site = {
         "id": "v",
@@ -44,6 +44,6 @@ def test_frames_that_need_more_memory_than_a_job_may_take_end_it_in_words():
         )
     error = Message.model_validate_json(ended.stdout.splitlines()[-1]).error
     assert error is not None
-    assert "need more memory than the 800 MB that one job may take (ESC_JOB_MEMORY_MB)" in error.detail
+    assert f"need more memory than the {MOST_MB} MB that one job may take (ESC_JOB_MEMORY_MB)" in error.detail
     # Beside what it writes, a process has libraries in memory, and others that this process waited for had their own.
     assert resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss * 1024 < (MOST_MB + 900) * 1e6

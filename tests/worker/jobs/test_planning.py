@@ -65,6 +65,7 @@ def test_a_camera_with_half_a_place_or_two_lenses_is_refused_in_words(given, wor
         site(given)
 
 
+@pytest.mark.long
 def test_a_whole_venue_is_planned_at_its_stored_poses():
     venue = venue_document("ground", CROWNED, pair())
     found = planning.solve(PlannedSite.model_validate(venue), "worn", 0.1)

@@ -147,6 +147,7 @@ def agrees(shown, expected, *, at_most):
     assert np.percentile(apart, 99) <= at_most
 
 
+@pytest.mark.long
 def test_ffmpeg_shows_the_demo_as_the_service_does(ffmpeg, tmp_path):
     cameras, field, files = demo_pair()
     made = unpacked(asked(cameras, "ffmpeg", {"left": WARM}, field, width_px=1920), tmp_path / "package")
@@ -171,6 +172,7 @@ def test_ffmpeg_shows_every_rig_as_the_service_does(ffmpeg, scene, tmp_path):
     assert (np.abs(shown[outside].astype(int) - BACKDROP) <= 2).all()
 
 
+@pytest.mark.long
 def test_ffmpeg_stitches_video_frame_by_frame_with_the_levels_of_the_cameras(ffmpeg, tmp_path):
     cameras, lights, _ = SCENES["a pair of different light"]
     made = unpacked(asked([told(one) for one in cameras], "ffmpeg", lights), tmp_path / "package")

@@ -20,7 +20,7 @@ from worker.video.stitch import Plan, StaticGeometry, StitchScene, stitch
 RATE = 25
 PERIOD_S = COUNT / RATE
 # How long is filmed: the first reports come within some three seconds.
-UNTIL_S = 9.0
+UNTIL_S = 6.5
 CAMERAS = [
     camera(name, (x, -48.0, 10.0), (aim, 0.0), 75.0, size=SIZE)
     for name, x, aim in (("left", -1.0, -18.0), ("right", 1.0, 18.0))

@@ -67,6 +67,7 @@ def test_the_pose_of_each_picture_that_was_looked_at_is_reported(clip):
     assert {pose.rate for pose in poses} == {25}
 
 
+@pytest.mark.long
 def test_a_camera_that_took_long_to_be_found_is_tracked_on_from_there(clip, monkeypatch):
     found, shots = [], clips.Clip.shots
     monkeypatch.setattr(
@@ -81,6 +82,7 @@ def test_a_camera_that_took_long_to_be_found_is_tracked_on_from_there(clip, monk
     assert turned_deg(pose.tracked.camera, swung(pose.number)) < 0.02
 
 
+@pytest.mark.long
 def test_a_camera_is_measured_in_a_picture_before_which_none_was_decoded_for_a_second(clip, monkeypatch):
     shots = clips.Clip.shots
     monkeypatch.setattr(clips.Clip, "shots", lambda *at: (s for n, s in enumerate(shots(*at)) if n in (0, COUNT - 1)))
@@ -168,6 +170,7 @@ def zoomed(camera, by):
     return camera.with_lens(replace(camera.intrinsics, matrix=matrix))
 
 
+@pytest.mark.long
 def test_a_camera_whose_lines_are_elsewhere_is_not_told_of(clip):
     with Tracking(clip, stored=moved(TRUE, (0.0, 0.2, 0.0))) as tracking:
         assert "its lines are not seen near where the stored pose expects them" in tracking.warnings.get(timeout=60)
@@ -178,5 +181,5 @@ def test_a_new_stored_pose_begins_anew_from_there(clip):
     with Tracking(clip) as tracking:
         tracking.poses.get(timeout=60)
         tracking.camera.anchor(moved(TRUE, (0.0002, 0.0, 0.0)))
-        poses = [tracking.poses.get(timeout=60) for _ in range(4)]
+        poses = [tracking.poses.get(timeout=60) for _ in range(2)]
     assert all(turned_deg(pose.tracked.camera, TRUE) < 1.0 for pose in poses)

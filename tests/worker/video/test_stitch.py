@@ -137,6 +137,7 @@ def test_an_offset_that_cannot_be_found_is_not_made_up(tmp_path):
     assert stitch(SCENE, clips, Plan(str(tmp_path / "pano.mp4"), TOGETHER, end_s=0.4), told).frames == 10
 
 
+@pytest.mark.long
 def test_uneven_and_slow_clips_become_even_ones(tmp_path):
     rng = np.random.default_rng(1)
     times = np.cumsum(rng.uniform(0.01, 0.07, 50)).tolist()
@@ -226,6 +227,7 @@ def test_a_clip_that_ends_early_ends_the_view_unless_one_goes_on_without_it(tmp_
     assert off(frames_of(tmp_path / "all.mp4")[40], expected(1.6, [LEFT])) <= 2
 
 
+@pytest.mark.long
 def test_clips_that_end_within_a_frame_of_each_other_have_not_ended_early(tmp_path, pair):
     clips = pair | {"right": str(film(tmp_path / "r.mp4", RIGHT, 1.96))}
     assert stitch(SCENE, clips, Plan(str(tmp_path / "pano.mp4"), TOGETHER), told).ended == {}

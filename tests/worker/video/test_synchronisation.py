@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from testbed.parameters import try_first
 from tests.worker.video.filming import LEFT, PITCH, RIGHT, cameras, film
 from worker.video.clips import Clip
 from worker.video.synchronisation import CoarseView, MotionSignal, chain_offsets, estimate_offset
@@ -25,7 +24,8 @@ def left(tmp_path_factory):
     return motion("left", film(tmp_path_factory.mktemp("left") / "l.mp4", LEFT, 6.0, options=COARSE | {"g": "12"}))
 
 
-@pytest.mark.parametrize(("offset", "rate"), try_first([(-0.5, 30), (0.137, 25), (0.0, 25), (1.3, 25)]))
+@pytest.mark.long
+@pytest.mark.parametrize(("offset", "rate"), [(-0.5, 30), (0.137, 25), (0.0, 25), (1.3, 25)])
 def test_the_offset_is_found_to_a_part_of_a_frame(left, tmp_path, offset, rate):
     path = film(tmp_path / "r.mp4", RIGHT, 6.0, begun_s=offset, rate=rate, options=COARSE | {"g": "10"})
     found = estimate_offset(left, motion("right", path))
@@ -65,6 +65,7 @@ def test_an_empty_pitch_tells_nothing(left, tmp_path):
     assert "nothing moves" in found.why
 
 
+@pytest.mark.long
 def test_clips_of_different_minutes_are_not_put_together(left, tmp_path):
     other = motion("right", film(tmp_path / "r.mp4", RIGHT, 6.0, begun_s=40))
     found = estimate_offset(left, other)
@@ -83,6 +84,7 @@ def test_an_instant_tells_nothing(left, tmp_path):
     assert "shorter than 2 s" in found.why
 
 
+@pytest.mark.long
 def test_a_camera_comes_in_time_by_one_that_is_in_time(left, tmp_path):
     right = motion("right", film(tmp_path / "r.mp4", RIGHT, 6.0, begun_s=0.4))
     offsets, found = chain_offsets(PLACES, {"left": left, "right": right}, {"left": 0.25})

@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 from worker.calibration.calibrate import calibrate
 from worker.calibration.checking.ranking import films_the_field, rank_readings
 from worker.calibration.checking.readings import Reading
+from worker.calibration.detection.evidence import TOLERANCE_PX
 from worker.calibration.detection.segmentation import whole_frame
 from worker.calibration.find_cameras import find_cameras
-from worker.calibration.gate.quality import CameraResult
+from worker.calibration.gate.quality import CameraResult, Moved
 from worker.calibration.geometry.camera import Camera, Frame
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.lens import Lens
@@ -54,7 +55,8 @@ class CheckedCamera:
 
     `given`: as the file has it, its lens for the frame's size; `reading`: the convention in which it fits; `meant`: the
     camera of that reading; `found`: as it was calibrated, None if it was not; `refusal`: why it was not; `is_resized`:
-    True if the lens was for pictures of another resolution; `searched`: the search that found it, None if it stands
+    True if the lens was for pictures of another resolution, `is_reordered` if its coefficients were in another order
+    than OpenCV's; `searched`: the search that found it, None if it stands
     where the file puts it; `explained`: share of the paint in the frame, 0..1, on the markings as the file puts them,
     None where little paint is seen.
     """
@@ -66,6 +68,7 @@ class CheckedCamera:
     found: CameraResult | None
     refusal: str | None
     is_resized: bool = False
+    is_reordered: bool = False
     searched: Search | None = None
     explained: float | None = None
 
@@ -86,6 +89,7 @@ class GivenCamera:
     camera: Camera
     is_resized: bool = False
     resized: Lens | None = None
+    reordered: Lens | None = None
     has_pose: bool = True
 
 
@@ -102,6 +106,7 @@ def check_cameras(
     checker = _Checker(pitch, {one.camera.id: one for one in given}, frames, segment, seed)
     progress.at_fraction("refinement", 0.0)
     checker.calibrate_as(TAKEN_AT_ITS_WORD, resized=False)
+    checker.calibrate_reordered()
     progress.at_fraction("segmentation", READINGS_AT)
     for reading, resized in checker.likeliest_readings():
         checker.calibrate_as(reading, resized=resized)
@@ -109,6 +114,11 @@ def check_cameras(
     checker.calibrate_turned()
     checker.search()
     return [checker.result(one.camera.id) for one in given]
+
+
+def good_within_px(camera: Camera) -> float:
+    """Return the mean shift of the markings up to which a calibration is good: a line counts as found so far off."""
+    return max(TOLERANCE_PX * camera.intrinsics.relative_size, 2.0)
 
 
 @dataclass
@@ -140,6 +150,33 @@ class _Checker:
                 self._settle(id, reading, meant[id], result, resized=resized)
             elif not result.view.usable and result.view.cause in OF_THE_FRAME:
                 self.unusable.add(id)
+
+    def calibrate_reordered(self) -> None:
+        """Settle the cameras that stand where the file puts them if its coefficients are k1, k2, k3, p1, p2.
+
+        Through a wrong lens a camera seems turned or zoomed: the reading by which it has not moved is meant.
+        """
+        for id, given in self.given.items():
+            if (
+                given.reordered is None
+                or not given.has_pose
+                or id in self.unusable
+                or self._stands(self.settled.get(id))
+            ):
+                continue
+            meant = given.camera.with_lens(given.reordered)
+            for result in self._calibrated([meant], "never"):
+                reordered = CheckedCamera(
+                    given.camera, True, TAKEN_AT_ITS_WORD, meant, result, None, given.is_resized, is_reordered=True
+                )
+                if result.accepted and self._stands(reordered):
+                    self.settled[id] = reordered
+
+    def _stands(self, checked: CheckedCamera | None) -> bool:
+        """True for a camera whose frame shows it where it was meant to be."""
+        if checked is None or checked.found is None:
+            return False
+        return Moved.between(self.pitch, checked.meant, checked.found.camera).pixels <= good_within_px(checked.meant)
 
     def calibrate_turned(self) -> None:
         """Calibrate the open cameras where they stand, whatever way they look."""
@@ -240,7 +277,7 @@ class _Checker:
         given = self.given[id]
         is_resized = given.is_resized or (resized and given.resized is not None)
         self.settled[id] = CheckedCamera(
-            given.camera, given.has_pose, reading, meant, found, None, is_resized, searched
+            given.camera, given.has_pose, reading, meant, found, None, is_resized, searched=searched
         )
 
     def _lens(self, given: GivenCamera, resized: bool) -> Lens:

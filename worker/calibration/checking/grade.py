@@ -5,9 +5,8 @@ from typing import Literal
 
 import numpy as np
 
-from worker.calibration.checking.check import CheckedCamera
+from worker.calibration.checking.check import CheckedCamera, good_within_px
 from worker.calibration.checking.readings import Cause
-from worker.calibration.detection.evidence import TOLERANCE_PX
 from worker.calibration.gate.displacement import measure_displacement
 from worker.calibration.gate.quality import CameraResult, Moved
 from worker.calibration.geometry.camera import Array, Camera, Pose
@@ -16,7 +15,7 @@ from worker.calibration.robust import SURE
 
 Grade = Literal["good", "drifted", "wrong", "cannot-tell"]
 Change = Literal["turned", "moved", "zoomed", "other-lens", "other-place"]
-CauseOfGrade = Cause | Change | Literal["other-resolution", "folds", "unexplained", "no-pose"]
+CauseOfGrade = Cause | Change | Literal["other-resolution", "distortion-order", "folds", "unexplained", "no-pose"]
 
 
 @dataclass(frozen=True)
@@ -60,6 +59,8 @@ def grade(pitch: Field, checked: CheckedCamera, lens_folds: str | None) -> Grade
     written: list[tuple[CauseOfGrade, str]] = [*zip(checked.reading.causes, checked.reading.words, strict=True)]
     if checked.is_resized:
         written.append(("other-resolution", "its lens is for pictures of another resolution"))
+    if checked.is_reordered:
+        written.append(("distortion-order", "its coefficients are k1, k2, k3, p1, p2 and not k1, k2, p1, p2, k3"))
     since: list[tuple[CauseOfGrade, str]] = []
     if difference.pixels > tolerance:
         written += folds
@@ -67,11 +68,6 @@ def grade(pitch: Field, checked: CheckedCamera, lens_folds: str | None) -> Grade
     if written or any(cause in ("other-place", "other-lens") for cause, _ in since):
         return GradedCamera(checked, "wrong", [*written, *since], difference)
     return GradedCamera(checked, "drifted" if since else "good", since, difference)
-
-
-def good_within_px(camera: Camera) -> float:
-    """Return the mean shift of the markings up to which a calibration is good: a line counts as found so far off."""
-    return max(TOLERANCE_PX * camera.intrinsics.relative_size, 2.0)
 
 
 def _not_found(checked: CheckedCamera, folds: list[tuple[CauseOfGrade, str]]) -> GradedCamera:

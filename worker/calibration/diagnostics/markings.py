@@ -20,6 +20,7 @@ from worker.calibration.geometry.camera import Array, Camera
 from worker.calibration.geometry.derivatives import POSE_NUMBERS
 from worker.calibration.geometry.field import Field, LinePoints
 from worker.calibration.geometry.ground import Ground
+from worker.calibration.geometry.lens import LENS_PARAMETERS
 from worker.calibration.geometry.parameters import lens_parameters
 from worker.calibration.refinement.estimate import POSE_SIGMA
 from worker.calibration.refinement.least_squares import CLUSTER_POINTS, LEAST_NOISE
@@ -308,9 +309,10 @@ def _rises(ground: Ground, measured: Measurements) -> Array:
 
 
 def _by_lens(camera: Camera, points: Array, measured: Measurements) -> Array:
-    """Return the moves (M, 6), px along their normals, of points (M, 3) by one sigma of each lens parameter."""
-    expected = np.array([number.expected for number in lens_parameters([camera])])
-    return np.nan_to_num(-measured.lens_jacobian(camera, points) * expected)
+    """Return the moves (M, P), px along their normals, of points (M, 3) by one sigma of each lens parameter."""
+    known = lens_parameters([camera])
+    jacobian = measured.lens_jacobian(camera, points)[:, [LENS_PARAMETERS.index(one.name) for one in known]]
+    return np.nan_to_num(-jacobian * [one.expected for one in known])
 
 
 def _given_way(

@@ -21,8 +21,6 @@ from worker.calibration.geometry.rotation import rotation_matrices, rotation_vec
 Frame = NDArray[np.uint8]
 """A picture as a camera took it: (height, width, 3), blue, green, red."""
 
-NEAREST_DEPTH_M = 0.1
-
 
 @dataclass(frozen=True)
 class Pose:
@@ -70,15 +68,14 @@ class Camera:
     ignored: Ignored | None = None
 
     def project(self, points: Array) -> Array:
-        """Project world points (..., 3) to pixels (..., 2); NaN behind the camera and outside the lens model."""
+        """Project world points (..., 3) to pixels (..., 2); NaN where its lens has no pixel."""
         in_a_row = points.reshape(-1, 3).T
         planes = _turned_and_bent(in_a_row, self.pose.matrix[None], self.pose.position[None], self.intrinsics)
         return np.stack(planes, axis=-1)[0].reshape(*points.shape[:-1], 2)
 
     def rays(self, pixels: ArrayLike) -> Array:
-        """Return directions in the world (..., 3), not normalised (depth 1), through pixels (..., 2)."""
-        plane = self.intrinsics.undistort(pixels)
-        return np.concatenate([plane, np.ones_like(plane[..., :1])], axis=-1) @ self.pose.matrix
+        """Return directions in the world (..., 3), not normalised, through pixels (..., 2)."""
+        return self.intrinsics.directions(pixels) @ self.pose.matrix
 
     def distance_m(self, other: "Camera") -> float:
         """Return the distance (m) between the positions of two cameras."""
@@ -121,9 +118,8 @@ def _turned_and_bent(points: Plane, matrices: Array, positions: Array, intrinsic
     """`project_planes` by rotation matrices (P, 3, 3)."""
     # R (X - C) as R X - R C: one product for the whole population.
     turned = matrices.astype(points.dtype) @ points
-    x, y, depth = np.moveaxis(turned - (matrices @ positions[..., None]).astype(points.dtype), 1, 0)
-    depth = np.where(depth > NEAREST_DEPTH_M, depth, np.nan)
-    return intrinsics.distort_planes(x / depth, y / depth)
+    x, y, z = np.moveaxis(turned - (matrices @ positions[..., None]).astype(points.dtype), 1, 0)
+    return intrinsics.project_planes(x, y, z)
 
 
 def inside(pixels: NDArray[np.floating[Any]], size: tuple[int, int], margin: float = 0.0) -> NDArray[np.bool_]:

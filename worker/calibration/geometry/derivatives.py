@@ -6,7 +6,7 @@ turn turns the view about the camera, and a shift means the same for all cameras
 
 import numpy as np
 
-from worker.calibration.geometry.camera import NEAREST_DEPTH_M, Array, Camera, Pose
+from worker.calibration.geometry.camera import Array, Camera, Pose
 from worker.calibration.geometry.rotation import cross_matrices, rotation_matrices, rotation_vectors
 
 POSE_NUMBERS = 6
@@ -30,9 +30,7 @@ def pixel_jacobian(camera: Camera, points: Array) -> Array:
     NaN where `Camera.project` is.
     """
     seen = _in_camera(camera, points)
-    rays = _rays(seen)
-    by_ray = camera.intrinsics.jacobian(rays)
-    by_point = np.concatenate([by_ray, -(by_ray @ rays[..., None])], axis=-1) / seen[..., 2:, None]
+    by_point = camera.intrinsics.point_jacobian(seen)
     # A turn w moves a point p by w x p, and b . (w x p) is w . (p x b); a shift of the camera moves it the other way.
     return np.concatenate([np.cross(seen[..., None, :], by_point), -by_point @ camera.pose.matrix], axis=-1)
 
@@ -42,7 +40,7 @@ def lens_jacobian(camera: Camera, points: Array) -> Array:
 
     NaN where `Camera.project` is.
     """
-    return camera.intrinsics.jacobian_by_parameters(_rays(_in_camera(camera, points)))
+    return camera.intrinsics.parameter_jacobian(_in_camera(camera, points))
 
 
 def full_pixel_jacobian(camera: Camera, points: Array) -> Array:
@@ -73,12 +71,6 @@ def full_ground_jacobian(camera: Camera, points: Array) -> Array:
 def _in_camera(camera: Camera, points: Array) -> Array:
     """Return world points (..., 3) in the camera's frame."""
     return (points - camera.pose.position) @ camera.pose.matrix.T
-
-
-def _rays(seen: Array) -> Array:
-    """Return image coordinates (..., 2) at depth 1 of points (..., 3) in the camera's frame; NaN behind it."""
-    depth = seen[..., 2:]
-    return seen[..., :2] / np.where(depth > NEAREST_DEPTH_M, depth, np.nan)
 
 
 def _point_jacobian(camera: Camera, seen: Array) -> Array:

@@ -1,7 +1,7 @@
-"""Lenses: OpenCV's two models, with projection and analytic derivatives.
+"""Lenses: OpenCV's two models, with projection and analytic derivatives. Those of panoramas are in `panorama`.
 
-A lens bends a ray, given by its undistorted image coordinates at depth 1 (x right, y down), to distorted ones, and its
-matrix makes pixels of those (pixel centres at integers). The models differ in how they bend alone.
+A lens of OpenCV's bends a ray, given by its undistorted image coordinates at depth 1 (x right, y down), to distorted
+ones, and its matrix makes pixels of those (pixel centres at integers). The models differ in how they bend alone.
 """
 
 from abc import ABC, abstractmethod
@@ -15,13 +15,15 @@ from numpy.typing import ArrayLike
 
 from worker.calibration.geometry.arrays import Array, Plane
 
-LensModel = Literal["opencv", "fisheye"]
+LensModel = Literal["opencv", "fisheye", "cylindrical", "equirectangular"]
 SigmaSource = Literal["lines"]
 DISTORTION_LENGTHS = (0, 4, 5, 8, 12, 14)
 FISHEYE_DISTORTION_LENGTHS = (0, 4)
 WIDEST_FISHEYE_RAD = np.radians(89.0)
 """Largest angle off the axis at which a fisheye is used: from a right angle on there are no image coordinates at depth
 1."""
+NEAREST_M = 0.1
+"""Least distance from a lens, along its axis or for a panorama from its axis, of a point that it sees."""
 IN_PIXELS = ("fx", "fy", "cx", "cy")
 LENS_PARAMETERS = ("focal_length_px", "principal_point_x_px", "principal_point_y_px", "aspect", "k1", "k2")
 """Lens parameters that lines can determine: fx, with which fy changes in proportion; cx and cy; fy / fx, which changes
@@ -32,7 +34,7 @@ SIGMA_NAMES = dict(zip(LENS_PARAMETERS, ("fx", "cx", "cy", "aspect", "k1", "k2")
 
 @dataclass(frozen=True)
 class Lens(ABC):
-    """A lens of one of OpenCV's models.
+    """A lens: points in the camera's frame (x right, y down, z forward) to pixels and back.
 
     `matrix` (3, 3) in pixels, `distortion` in OpenCV's order for the model, `size` (width, height); `sigma`: one
     standard deviation of its numbers by name (fx, fy, cx, cy in pixels, aspect = fy/fx, k1 ...), of those of which it
@@ -47,6 +49,104 @@ class Lens(ABC):
     model: ClassVar[LensModel]
     terms: ClassVar[int]
     """Number of coefficients of the model."""
+    parameters: ClassVar[tuple[str, ...]] = LENS_PARAMETERS
+    """Those of `LENS_PARAMETERS` that the model has and lines can tell from the pose."""
+
+    def project(self, points: Array) -> Array:
+        """Project points (..., 3) in the camera's frame to pixels (..., 2); NaN where the model has no pixel."""
+        return np.stack(self.project_planes(*np.moveaxis(points, -1, 0)), axis=-1)
+
+    @abstractmethod
+    def project_planes(self, x: Plane, y: Plane, z: Plane) -> tuple[Plane, Plane]:
+        """Do as `project` for coordinates (...) apart, in their own precision: large populations need it."""
+
+    @abstractmethod
+    def point_jacobian(self, points: Array) -> Array:
+        """Jacobian (..., 2, 3) of the pixels of points (..., 3) in the camera's frame by the points."""
+
+    @abstractmethod
+    def parameter_jacobian(self, points: Array) -> Array:
+        """Jacobian (..., 2, 6) of the pixels of points (..., 3) in the camera's frame by `LENS_PARAMETERS`."""
+
+    @abstractmethod
+    def directions(self, pixels: ArrayLike) -> Array:
+        """Return directions (..., 3) in the camera's frame, not normalised, of pixels (..., 2); NaN without a ray."""
+
+    def distort(self, rays: Array) -> Array:
+        """Project undistorted image coordinates (..., 2) at depth 1 to pixels (..., 2); NaN where none is."""
+        return self.project(np.concatenate([rays, np.ones_like(rays[..., :1])], axis=-1))
+
+    def undistort(self, pixels: ArrayLike) -> Array:
+        """Return image coordinates (..., 2) at depth 1 of pixels (..., 2); NaN where no ray goes forward."""
+        directions = self.directions(pixels)
+        depth = directions[..., 2:]
+        # As far aside as a fisheye is used.
+        ahead = depth > np.cos(WIDEST_FISHEYE_RAD) * np.linalg.norm(directions, axis=-1, keepdims=True)
+        return np.asarray(directions[..., :2] / np.where(ahead, depth, np.nan))
+
+    def border(self, a_side: int) -> Array:
+        """Return pixels (4 `a_side`, 2) around the border of the picture, in order, `a_side` of them on each side."""
+        width, height = self.size
+        across, down = np.linspace(0, width - 1, a_side), np.linspace(0, height - 1, a_side)
+        top, right = np.c_[across, 0 * across], np.c_[0 * down + width - 1, down]
+        bottom, left = np.c_[across[::-1], 0 * across + height - 1], np.c_[0 * down, down[::-1]]
+        return np.concatenate([top, right, bottom, left])
+
+    @property
+    def focal_length_px(self) -> float:
+        """Horizontal focal length."""
+        return float(self.matrix[0, 0])
+
+    @property
+    def relative_size(self) -> float:
+        """Ratio of the picture's longer side to that of a 4K frame, by which lengths in 4K pixels scale."""
+        return max(self.size) / 3840
+
+    @cached_property
+    def coefficients(self) -> Array:
+        """The coefficients (`terms`,) of the model in OpenCV's order, absent ones zero."""
+        padded = np.zeros(self.terms)
+        padded[: len(self.distortion)] = self.distortion
+        return padded
+
+    def scaled(self, factor: float) -> Self:
+        """Return the lens of a picture resized by `factor`, pixel centres at integers before and after."""
+        width, height = round(self.size[0] * factor), round(self.size[1] * factor)
+        matrix = self.matrix.copy()
+        for axis, ratio in ((0, width / self.size[0]), (1, height / self.size[1])):
+            matrix[axis] *= ratio
+            matrix[axis, 2] = (self.matrix[axis, 2] + 0.5) * ratio - 0.5
+        sigma = {name: value * (factor if name in IN_PIXELS else 1.0) for name, value in self.sigma.items()}
+        return replace(self, matrix=matrix, size=(width, height), sigma=sigma)
+
+
+class PlanarLens(Lens):
+    """A lens whose rays are given by their undistorted image coordinates at depth 1, as OpenCV's are."""
+
+    def project_planes(self, x: Plane, y: Plane, z: Plane) -> tuple[Plane, Plane]:
+        """Do as `project` for coordinates (...) apart; NaN behind the camera and beyond `largest_radius`."""
+        depth = np.where(z > NEAREST_M, z, np.nan)
+        return self.distort_planes(x / depth, y / depth)
+
+    def point_jacobian(self, points: Array) -> Array:
+        """Jacobian (..., 2, 3) of the pixels of points (..., 3) by the points; NaN where `project` is."""
+        rays = self._rays(points)
+        by_ray = self.jacobian(rays)
+        return np.concatenate([by_ray, -(by_ray @ rays[..., None])], axis=-1) / points[..., 2:, None]
+
+    def parameter_jacobian(self, points: Array) -> Array:
+        """Jacobian (..., 2, 6) of the pixels of points (..., 3) by `LENS_PARAMETERS`; NaN where `project` is."""
+        return self.jacobian_by_parameters(self._rays(points))
+
+    def directions(self, pixels: ArrayLike) -> Array:
+        """Return directions (..., 3) of depth 1 in the camera's frame of pixels (..., 2); NaN without a ray."""
+        plane = self.undistort(pixels)
+        return np.concatenate([plane, np.ones_like(plane[..., :1])], axis=-1)
+
+    def _rays(self, points: Array) -> Array:
+        """Return image coordinates (..., 2) at depth 1 of points (..., 3); NaN behind the camera."""
+        depth = points[..., 2:]
+        return np.asarray(points[..., :2] / np.where(depth > NEAREST_M, depth, np.nan))
 
     def distort(self, rays: Array) -> Array:
         """Project undistorted image coordinates (..., 2) at depth 1 to pixels (..., 2); NaN beyond `largest_radius`."""
@@ -98,48 +198,13 @@ class Lens(ABC):
     def _bent_by_terms(self, rays: Array) -> Array:
         """Jacobian (..., 2, 2) of the distorted coordinates of rays (..., 2) by k1 and k2."""
 
-    def border(self, a_side: int) -> Array:
-        """Return pixels (4 `a_side`, 2) around the border of the picture, in order, `a_side` of them on each side."""
-        width, height = self.size
-        across, down = np.linspace(0, width - 1, a_side), np.linspace(0, height - 1, a_side)
-        top, right = np.c_[across, 0 * across], np.c_[0 * down + width - 1, down]
-        bottom, left = np.c_[across[::-1], 0 * across + height - 1], np.c_[0 * down, down[::-1]]
-        return np.concatenate([top, right, bottom, left])
-
-    @property
-    def focal_length_px(self) -> float:
-        """Horizontal focal length."""
-        return float(self.matrix[0, 0])
-
-    @property
-    def relative_size(self) -> float:
-        """Ratio of the picture's longer side to that of a 4K frame, by which lengths in 4K pixels scale."""
-        return max(self.size) / 3840
-
-    @cached_property
-    def coefficients(self) -> Array:
-        """The coefficients (`terms`,) of the model in OpenCV's order, absent ones zero."""
-        padded = np.zeros(self.terms)
-        padded[: len(self.distortion)] = self.distortion
-        return padded
-
-    def scaled(self, factor: float) -> Self:
-        """Return the lens of a picture resized by `factor`, pixel centres at integers before and after."""
-        width, height = round(self.size[0] * factor), round(self.size[1] * factor)
-        matrix = self.matrix.copy()
-        for axis, ratio in ((0, width / self.size[0]), (1, height / self.size[1])):
-            matrix[axis] *= ratio
-            matrix[axis, 2] = (self.matrix[axis, 2] + 0.5) * ratio - 0.5
-        sigma = {name: value * (factor if name in IN_PIXELS else 1.0) for name, value in self.sigma.items()}
-        return replace(self, matrix=matrix, size=(width, height), sigma=sigma)
-
     def _within_model(self, rays: Array) -> Array:
         """Return rays (..., 2), NaN beyond `largest_radius`."""
         beyond = np.sum(rays * rays, axis=-1, keepdims=True) > self.largest_radius**2
         return np.where(beyond, np.nan, rays)
 
 
-class Intrinsics(Lens):
+class Intrinsics(PlanarLens):
     """A lens of OpenCV's calib3d: pinhole with radial, tangential, thin prism and tilt terms (Brown and Conrady).
 
     `distortion` (`DISTORTION_LENGTHS`): k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4 tau_x tau_y. The formulae are those of
@@ -289,7 +354,7 @@ class Intrinsics(Lens):
         return np.interp(distorted_radius, radii * radial, radii) / np.maximum(distorted_radius, 1e-6)
 
 
-class Fisheye(Lens):
+class Fisheye(PlanarLens):
     """A lens of OpenCV's fisheye module: Kannala and Brandt, "A generic camera model", PAMI 2006, with four terms.
 
     A ray at the angle t off the axis ends at the distance t (1 + k1 t² + k2 t⁴ + k3 t⁶ + k4 t⁸) from the centre, for
@@ -369,6 +434,3 @@ class Fisheye(Lens):
         rays = self._within_model(rays)
         radius = np.linalg.norm(rays, axis=-1)
         return radius, np.arctan(radius), rays / np.maximum(radius, 1e-12)[..., None]
-
-
-LENSES: Mapping[LensModel, type[Lens]] = {"opencv": Intrinsics, "fisheye": Fisheye}

@@ -113,7 +113,7 @@ def with_lens_values(lens: Lens, numbers: Array) -> Lens:
     fx, cx, cy, aspect, k1, k2 = numbers.tolist()
     matrix = np.array([[fx, lens.matrix[0, 1], cx], [0.0, aspect * fx, cy], [0.0, 0.0, 1.0]])
     distortion = lens.distortion
-    if k1 or k2 or len(distortion):
+    if lens.terms and (k1 or k2 or len(distortion)):
         distortion = np.array([k1, k2, *(lens.distortion[2:] if len(distortion) else (0.0, 0.0))])
     return replace(lens, matrix=matrix, distortion=distortion)
 
@@ -139,7 +139,9 @@ def lens_parameters_without_heat(cameras: Sequence[Camera]) -> list[LensParamete
     for number, camera in enumerate(cameras):
         lens = camera.intrinsics
         # Lines that a lens was found by are asked again, and must not vouch for it twice.
-        known = free_lens_sigma(lens) if lens.sigma_from == "lines" else lens.sigma
+        # Of a panorama no board says anything: what is not stated is as open as in a search.
+        free = free_lens_sigma(lens)
+        known = free if lens.sigma_from == "lines" else lens.sigma if lens.terms else free | dict(lens.sigma)
         pixel = lens.relative_size
         expected = {
             "focal_length_px": _focal_sigma(lens, known),
@@ -149,7 +151,7 @@ def lens_parameters_without_heat(cameras: Sequence[Camera]) -> list[LensParamete
             "k1": known.get("k1", BOARD_RADIAL),
             "k2": known.get("k2", BOARD_RADIAL),
         }
-        found += [LensParameter(number, name, expected[name]) for name in LENS_PARAMETERS]
+        found += [LensParameter(number, name, expected[name]) for name in lens.parameters]
     return found
 
 
@@ -162,6 +164,12 @@ def _focal_sigma(lens: Lens, sigma: Mapping[str, float]) -> float:
 
 def free_lens_sigma(lens: Lens) -> dict[str, float]:
     """Return the sigma, by the names of `Lens.sigma`, of a lens that only lines determine."""
+    if not lens.terms:
+        # Maker's "180°" and stitchers' rows are good to a few per cent of the focal length, the rows of a level horizon
+        # as well.
+        uncertain = 0.03
+        focal = lens.focal_length_px
+        return {"fx": uncertain * focal, "aspect": uncertain, "cy": uncertain * focal}
     half_width = lens.size[0] / (2 * lens.focal_length_px)
     # Twenty pixels of a 4K frame.
     centre = 20 / 3840 * lens.size[0]

@@ -17,7 +17,7 @@ from worker.calibration.detection.line_measurement import Measurements
 from worker.calibration.geometry.camera import Array, Camera, Pose
 from worker.calibration.geometry.derivatives import change_between, moved
 from worker.calibration.geometry.field import LinePoints
-from worker.calibration.geometry.lens import LENSES
+from worker.calibration.geometry.lens_models import LENSES
 from worker.calibration.geometry.visibility import VisibleLines
 from worker.calibration.robust import tukey_weights
 

@@ -12,7 +12,7 @@ import numpy as np
 from worker.calibration.geometry.camera import Array
 from worker.calibration.geometry.derivatives import POSE_NUMBERS
 from worker.calibration.geometry.lens import Lens
-from worker.calibration.onboarding.point_fit import STRONG, PointFit, fit, refit
+from worker.calibration.onboarding.point_fit import FREE_PARAMETERS, STRONG, PointFit, fit, refit
 
 LENS_LADDER: tuple[tuple[str, ...], ...] = (
     ("focal length",),
@@ -65,7 +65,12 @@ def free_lens(found: PointFit) -> LensGain | None:
     """Return the gain from as many free parameters of the lens as the clicks justify; None: they justify none."""
     lens = found.camera.intrinsics
     believed = int((~found.doubted).sum())
-    rungs = [free for free in LENS_LADDER if 2 * believed >= POSE_NUMBERS + len(free) + FEWEST_SPARE]
+    rungs = [
+        free
+        for free in LENS_LADDER
+        if 2 * believed >= POSE_NUMBERS + len(free) + FEWEST_SPARE
+        and {FREE_PARAMETERS[name] for name in free} <= set(lens.parameters)
+    ]
     tried = [
         fit(found.clicks, found.camera.with_lens(two_terms(lens)) if "k1" in free else found.camera, free)
         for free in rungs

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from worker.calibration.geometry.camera import Array
-from worker.calibration.geometry.lens import LENSES, Lens, LensModel
+from worker.calibration.geometry.lens import Lens, LensModel
+from worker.calibration.geometry.lens_models import LENSES
 from worker.calibration.geometry.rotation import rotation_matrices
 from worker.calibration.onboarding.boards import BoardDetection
 

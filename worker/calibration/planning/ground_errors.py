@@ -53,5 +53,8 @@ def sigmas(jacobian: Array, covariance: Array, uneven_m: float) -> Array:
     `covariance` (D, D) of the errors, `uneven_m` of the ground beside the surface.
     """
     by_errors, by_ground = jacobian[..., :-1], jacobian[..., -1]
-    variance = np.einsum("nij,jk,nik->n", by_errors, covariance, by_errors, optimize=True)
+    # A camera has some of the unknowns of all cameras.
+    own = np.flatnonzero(by_errors.any(axis=(0, 1)))
+    by_errors = by_errors[..., own]
+    variance = np.sum((by_errors @ covariance[np.ix_(own, own)]) * by_errors, axis=(1, 2))
     return np.asarray(np.sqrt(variance + uneven_m**2 * np.sum(by_ground**2, axis=-1)), dtype=float)

@@ -4,7 +4,8 @@ The covariance is the engine's own, of the lines that the cameras would see (`re
 measurements are expected ones.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
@@ -78,7 +79,10 @@ class PairPlan:
 
 @dataclass(frozen=True)
 class Plan:
-    """Plan of all cameras. `xy` (H, W, 2): centres of the cells of its maps, m, row by row from the far touchline."""
+    """Plan of all cameras, made by `planner`.
+
+    `xy` (H, W, 2): centres of the cells of its maps, m, row by row from the far touchline.
+    """
 
     pitch: Field
     state: LineState
@@ -86,6 +90,7 @@ class Plan:
     xy: Array
     cameras: Sequence[CameraPlan]
     pairs: Sequence[PairPlan]
+    planner: "Planner"
 
     @property
     def cell_m2(self) -> float:
@@ -101,10 +106,6 @@ class Plan:
     def px_per_metre(self) -> Array:
         """Pixels (H, W) per metre in the camera that resolves a place best."""
         return np.fmax.reduce([one.px_per_metre for one in self.cameras])
-
-    def planner(self, cameras: Sequence[Camera]) -> "Planner":
-        """Return a planner of other cameras on the same field, by the same lines."""
-        return Planner(self.pitch, cameras, self.state, self.hidden)
 
     @property
     def coverage(self) -> NDArray[np.intp]:
@@ -130,14 +131,32 @@ class Planner:
     """Expected measurements and errors of all cameras, and the ground that each of them sees."""
 
     def __init__(self, pitch: Field, cameras: Sequence[Camera], state: LineState, hidden: float) -> None:
-        self._pitch, self._cameras, self._state, self._hidden = pitch, cameras, state, hidden
+        self._pitch, self._cameras, self._state, self._hidden = pitch, list(cameras), state, hidden
         self._lines, self._xy = pitch.measured_points, field_cells(pitch)
         self._ground = pitch.lift(self._xy)
-        self._measured = [expect_measurements(self._lines, camera, state, hidden) for camera in cameras]
+        self._measured = [self._expected(camera) for camera in cameras]
+        self._seen = [self._in_view(camera) for camera in cameras]
         self._model = ErrorModel(pitch, cameras)
         self.errors = self._model.expect(self._measured)
-        self._seen = [camera.sees(camera.project(self._ground)) for camera in cameras]
         self._jacobians = dict[int, Array]()
+
+    def with_moved(self, moved: Mapping[int, Camera]) -> "Planner":
+        """Return the planner with some cameras, by their numbers, at other poses; what the others see is the same."""
+        other = copy(self)
+        other._cameras, other._measured, other._seen = [*self._cameras], [*self._measured], [*self._seen]
+        for number, camera in moved.items():
+            other._cameras[number] = camera
+            other._measured[number], other._seen[number] = self._expected(camera), self._in_view(camera)
+        other._model = self._model.at_poses(other._cameras)
+        other.errors = other._model.expect(other._measured)
+        other._jacobians = {number: its for number, its in self._jacobians.items() if number not in moved}
+        return other
+
+    def _expected(self, camera: Camera) -> Measurements:
+        return expect_measurements(self._lines, camera, self._state, self._hidden)
+
+    def _in_view(self, camera: Camera) -> Mask:
+        return camera.sees(camera.project(self._ground))
 
     def plan(self) -> Plan:
         """Return the plan of all cameras and pairs."""
@@ -149,6 +168,7 @@ class Planner:
             self._xy,
             [self.camera(number) for number in range(len(self._cameras))],
             [self.pair(*pair) for pair in pairs if self.both_see(*pair).any()],
+            self,
         )
 
     def calibrated_without(self, markings: Sequence[int]) -> list[Array]:

@@ -80,5 +80,5 @@ def field_of_view_deg(camera: Camera) -> float:
     """Return the horizontal angle that a camera sees in the middle row of its picture, degrees."""
     width, height = camera.intrinsics.size
     middle = (height - 1) / 2
-    left, right = camera.intrinsics.undistort(np.array([[-0.5, middle], [width - 0.5, middle]]))[:, 0].tolist()
-    return float(np.degrees(np.arctan(right) - np.arctan(left)))
+    left, right = camera.intrinsics.directions(np.array([[-0.5, middle], [width - 0.5, middle]]))
+    return float(np.degrees(np.arctan2(right[0], right[2]) - np.arctan2(left[0], left[2])))

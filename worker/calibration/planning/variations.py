@@ -37,14 +37,15 @@ class DecisiveMarking:
 def decisive_markings(planned: Plan) -> list[list[DecisiveMarking]]:
     """Return for each camera the markings that it measures, the one that it can least do without first."""
     found: list[list[DecisiveMarking]] = [[] for _ in planned.cameras]
-    planner = planned.planner([one.camera for one in planned.cameras])
     names = planned.pitch.whole_names()
     line_m = np.sum([one.line_m for one in planned.cameras], axis=0)
     for name in dict.fromkeys(names):
         its = [number for number, whole in enumerate(names) if whole == name]
         if line_m[its].sum() == 0:
             continue
-        for markings, before, after in zip(found, planned.cameras, planner.calibrated_without(its), strict=True):
+        for markings, before, after in zip(
+            found, planned.cameras, planned.planner.calibrated_without(its), strict=True
+        ):
             if before.line_m[its].sum() > 0:
                 markings.append(DecisiveMarking(name, _change(before.calibrated_m, after)))
     return [sorted(markings, key=lambda one: -one.without.factor) for markings in found]
@@ -52,9 +53,7 @@ def decisive_markings(planned: Plan) -> list[list[DecisiveMarking]]:
 
 def higher(planned: Plan, number: int) -> Change:
     """Return what `HIGHER_M` more of height would do to the places that a camera tells, aimed at the same ground."""
-    cameras = [one.camera for one in planned.cameras]
-    cameras[number] = raised(cameras[number], HIGHER_M)
-    after = planned.planner(cameras).camera(number)
+    after = planned.planner.with_moved({number: raised(planned.cameras[number].camera, HIGHER_M)}).camera(number)
     return _change(planned.cameras[number].place_m, after.place_m)
 
 
@@ -66,9 +65,10 @@ def with_more_overlap(planned: Plan, pair: PairPlan) -> PairPlan | None:
     # Seen from above, the view of the first camera lies to the right of that of the second one, or to the left.
     ahead, other = (cameras[number].pose.matrix[2, :2] for number in (first, second))
     to_the_left = np.sign(ahead[0] * other[1] - ahead[1] * other[0]) or 1.0
-    for number, side in ((first, to_the_left), (second, -to_the_left)):
-        cameras[number] = panned(cameras[number], side * OVERLAP_DEG / 2)
-    planner = planned.planner(cameras)
+    sides = {first: to_the_left, second: -to_the_left}
+    planner = planned.planner.with_moved(
+        {number: panned(cameras[number], side * OVERLAP_DEG / 2) for number, side in sides.items()}
+    )
     return planner.pair(first, second) if planner.both_see(first, second).any() else None
 
 

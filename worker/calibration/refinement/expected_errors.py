@@ -1,7 +1,8 @@
 """Errors that a calibration would have, by the lines that its cameras would see: of a plan, before any frame exists."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from copy import copy
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -12,6 +13,7 @@ from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.ground import Ground
 from worker.calibration.refinement.estimate import Estimate
 from worker.calibration.refinement.information import expected_information
+from worker.calibration.refinement.least_squares import FEWEST_MEASUREMENTS, Rows
 from worker.calibration.refinement.priors import unknowns_of
 from worker.calibration.refinement.uncertainty import Sigma
 from worker.calibration.refinement.unknowns import Unknowns
@@ -76,12 +78,32 @@ class ErrorModel:
         solved = Unknowns(len(cameras), (), Ground.under(pitch.measured_points))
         self._estimate = Estimate.initial(pitch, cameras, solved)
         self.unknowns = unknowns_of(self._estimate, [None] * len(cameras), solved)
+        self._rows = dict[int, tuple[Camera, Measurements, Rows]]()
+
+    def at_poses(self, cameras: Sequence[Camera]) -> "ErrorModel":
+        """Return the model of the same cameras at other poses, whose unknowns and ground are the same."""
+        other = copy(self)
+        other._estimate = replace(self._estimate, cameras=list(cameras))
+        return other
 
     def expect(self, measured: Sequence[Measurements]) -> ExpectedErrors:
         """Return the errors expected of a calibration by lines `measured` where the poses of the cameras put them."""
         return ExpectedErrors(
             self.unknowns,
-            expected_information(self._estimate, measured, self.unknowns),
+            expected_information(self._estimate, self._rows_of(measured), self.unknowns),
             self._estimate.weak_prior(),
             np.array([parameter.expected**2 for parameter in self.unknowns.parameters]),
         )
+
+    def _rows_of(self, measured: Sequence[Measurements]) -> list[Rows]:
+        """Return the rows of the views, those of the first time where neither camera nor measurements are others."""
+        views = enumerate(zip(self._estimate.cameras, measured, strict=True))
+        return [self._of_view(view, *its) for view, its in views if len(its[1]) >= FEWEST_MEASUREMENTS]
+
+    def _of_view(self, view: int, camera: Camera, measured: Measurements) -> Rows:
+        before = self._rows.get(view)
+        if before is not None and before[0] is camera and before[1] is measured:
+            return before[2]
+        rows = Rows.of(self._estimate.lines.position, camera, view, measured, self.unknowns)
+        self._rows.setdefault(view, (camera, measured, rows))
+        return rows

@@ -127,13 +127,13 @@ class LineLikelihood:
         return Sandwich.of(rows, heights, self._unknowns)
 
 
-def expected_information(estimate: Estimate, measured: Sequence[Measurements], unknowns: Unknowns) -> Array:
+def expected_information(estimate: Estimate, rows: Sequence[Rows], unknowns: Unknowns) -> Array:
     """Return the information (D, D) on the dense unknowns, ground marginalised, of lines whose offsets are unknown yet.
 
-    Every error is taken to be as large as its standard deviation says, so that no residual has a say: `measured` lie
-    where the cameras of the estimate expect them.
+    Every error is taken to be as large as its standard deviation says, so that no residual has a say: `rows` lie where
+    the cameras of the estimate expect them.
     """
-    rows, dense = estimate.rows(measured, unknowns), unknowns.dense
+    dense = unknowns.dense
     information = normal_equations(weigh_rows(rows, estimate.heights, unknowns, tukey_weights)).information
     of_heights = information[dense:, dense:] + estimate.ground_precision(unknowns)
     effect = np.linalg.solve(of_heights, information[dense:, :dense])

@@ -420,7 +420,8 @@ class _JointPosterior:
         free = {(p.camera, p.name) for p in solved.parameters if isinstance(p, LensParameter)}
         return [
             Deviation(camera.id, p.name, float(value[at]), float(np.sqrt(variance[at])), p.expected)
-            for at, p in enumerate(lens_parameters([camera]))
+            for p in lens_parameters([camera])
+            for at in [LENS_PARAMETERS.index(p.name)]
             if (number, p.name) not in free
         ]
 

@@ -88,16 +88,12 @@ def _likeliest(
     effect = np.linalg.solve(of_rest, coupling) if len(rest) else np.zeros((0, len(which)))
     alone = information[np.ix_(which, which)] - coupling.T @ effect
     combined = information_vector[which] - effect.T @ (information_vector[rest] + certainty[rest] * mean[rest])
-    choices = list(product(*(range(len(group.scales)) for group in block)))
-    tried = np.stack(
-        [
-            np.concatenate([group.certainty(group.scales[at]) for group, at in zip(block, choice, strict=True)])
-            for choice in choices
-        ]
-    )
+    choices = np.array([*product(*(range(len(group.scales)) for group in block))])
+    of_scales = [np.stack([group.certainty(scale) for scale in group.scales]) for group in block]
+    tried = np.concatenate([one[choices[:, column]] for column, one in enumerate(of_scales)], axis=1)
     evidence = _log_evidence(alone, combined, tried, mean[which])
     weighed = [(column, group.odds) for column, group in enumerate(block) if group.odds is not None]
-    log_odds = sum((np.log(odds)[np.array(choices)[:, column]] for column, odds in weighed), np.zeros(len(choices)))
+    log_odds = sum((np.log(odds)[choices[:, column]] for column, odds in weighed), np.zeros(len(choices)))
     chosen = tried[np.argmax(evidence + log_odds)]
     share = np.exp(evidence + log_odds - np.max(evidence + log_odds))
     has_odds = np.repeat([group.odds is not None for group in block], [len(group.which) for group in block])

@@ -56,37 +56,38 @@ def _expected_and_found(
         ahead &= 3 * bent > -1
         x, y = x * (1 + bent), y * (1 + bent)
     height, width = view.distance.shape
-    column = np.clip(np.rint(x - view.corner[0]), -1, width).astype(np.int32)
-    row = np.clip(np.rint(y - view.corner[1]), -1, height).astype(np.int32)
+    # A plain number leaves the coordinates in single precision.
+    left, top = view.corner.tolist()
+    column = np.clip(np.rint(x - left), -1, width).astype(np.int32)
+    row = np.clip(np.rint(y - top), -1, height).astype(np.int32)
     seen = ahead & (column >= 0) & (row >= 0) & (column < width) & (row < height)
-    row, column = np.where(seen, row, 0), np.where(seen, column, 0)
-    counted = seen & view.covered[row, column] & field.joined
-    steps = np.hypot(np.diff(x, axis=1, append=x[:, -1:]), np.diff(y, axis=1, append=y[:, -1:]))
+    # `take` from a flat array is many times as fast as two indices.
+    cell = np.where(seen, row * width + column, 0)
+    counted = seen & view.covered.ravel().take(cell) & field.joined
+    step = np.diff(x, axis=1, append=x[:, -1:]) ** 2 + np.diff(y, axis=1, append=y[:, -1:]) ** 2
     # Longest counted distance between two points of a marking in the view, view pixels.
-    lengths = np.minimum(steps, 25.0) * counted
-    near = np.exp(-((view.distance[row, column] / tolerance) ** 2))
+    lengths = np.minimum(np.sqrt(step), 25.0) * counted
+    near = np.exp(-((view.distance.ravel().take(cell) / tolerance) ** 2))
     return lengths.sum(axis=1), (lengths * near).sum(axis=1), counted.sum(axis=1)
 
 
 def _explained(field: FieldMap, view: LineView, cameras: Hypotheses, tolerance: float) -> Array:
     """Return, for each hypothesis, the share of the places on paint that lie on a marking, 0..1."""
-    rotations = cameras.rotations.astype(np.float32)
-    positions = cameras.positions.astype(np.float32)
+    rotations = cameras.rotations.astype(np.float32)[..., None]
+    positions = cameras.positions.astype(np.float32)[..., None]
     focal = cameras.focal_px.astype(np.float32)[:, None]
     x, y = (straightened(view.places, cameras.bends) / focal[..., None]).transpose(2, 0, 1)
-    rays = np.stack([x, y, np.ones_like(x)], axis=-1) @ rotations
-    down = rays[..., 2] < -1e-3
-    depth = np.where(down, -positions[:, None, 2] / np.where(down, rays[..., 2], -1), 0)
-    row, column = field.cells(
-        positions[:, None, 0] + depth * rays[..., 0], positions[:, None, 1] + depth * rays[..., 1]
-    )
-    on_map = down & (row >= 0)
-    beside = field.nearest[np.where(on_map, row, 0), np.where(on_map, column, 0)]
+    # Axis by axis: arrays (P, M) that lie side by side in memory are several times as fast as one (P, M, 3).
+    ray = [rotations[:, 0, axis] * x + rotations[:, 1, axis] * y + rotations[:, 2, axis] for axis in range(3)]
+    down = ray[2] < -1e-3
+    depth = np.where(down, -positions[:, 2] / np.where(down, ray[2], -1), 0)
+    beside, on_map = field.to_paint(positions[:, 0] + depth * ray[0], positions[:, 1] + depth * ray[1])
     # From metres on the ground to pixels: the derivative of the projection along the way to the nearest paint.
-    turned = rotations[:, None, :, 0] * beside[..., :1] + rotations[:, None, :, 1] * beside[..., 1:]
+    turned = [rotations[:, axis, 0] * beside[0] + rotations[:, axis, 1] * beside[1] for axis in range(3)]
     scale = focal / np.maximum(depth, 0.1)
-    off = np.hypot(scale * (turned[..., 0] - x * turned[..., 2]), scale * (turned[..., 1] - y * turned[..., 2]))
-    return np.asarray(np.where(on_map, np.exp(-((off / tolerance) ** 2)), 0).mean(axis=1))
+    across, along = turned[0] - x * turned[2], turned[1] - y * turned[2]
+    off = (scale / tolerance) ** 2 * (across * across + along * along)
+    return np.asarray(np.where(down & on_map, np.exp(-off), 0).mean(axis=1))
 
 
 def straightened(places: NDArray[np.float32], bends: Array) -> NDArray[np.float32]:

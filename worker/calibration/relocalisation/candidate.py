@@ -124,7 +124,8 @@ def with_sigmas(found: RefinedPose) -> Camera:
     if found.refined is None:
         return found.camera
     deviations = np.sqrt(np.diag(found.refined.covariance)[POSE_NUMBERS:]).tolist()
-    known = dict(zip(SIGMA_NAMES.values(), deviations, strict=True))
+    named = zip(SIGMA_NAMES.items(), deviations, strict=True)
+    known = {short: sigma for (name, short), sigma in named if name in found.camera.intrinsics.parameters}
     known["fy"] = float(np.hypot(known["fx"], known.pop("aspect") * found.camera.intrinsics.focal_length_px))
     return found.camera.with_lens(replace(found.camera.intrinsics, sigma=known, sigma_from="lines"))
 

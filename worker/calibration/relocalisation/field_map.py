@@ -61,20 +61,24 @@ class FieldMap:
             half,
         )
 
-    def cells(self, x: Array, y: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """Return row and column of the cells of ground places; -1 for both where the map does not reach."""
+    def to_paint(self, x: Array, y: Array) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+        """Return the vectors (2, ...) m from the nearest paint to the cells of ground places, and True on the map."""
         rows, columns = self.nearest.shape[:2]
-        column = np.floor((x - self.origin[0]) / self.cell_m + 0.5)
-        row = np.floor((y - self.origin[1]) / self.cell_m + 0.5)
+        left, lowest = self.origin.tolist()
+        column = np.floor((x - left) / self.cell_m + 0.5)
+        row = np.floor((y - lowest) / self.cell_m + 0.5)
         within = (column >= 0) & (row >= 0) & (column < columns) & (row < rows)
-        return np.where(within, row, -1).astype(np.intp), np.where(within, column, -1).astype(np.intp)
+        column, row = (np.where(within, one, 0).astype(np.intp) for one in (column, row))
+        # `take` from a flat array is ten times as fast as two indices.
+        vectors = self.nearest.reshape(-1, 2).take(row * columns + column, axis=0)
+        return np.moveaxis(vectors, -1, 0), within
 
     @cached_property
     def is_symmetric(self) -> bool:
         """True if the field turned by half a turn looks the same, so that each view has a twin."""
         turned = -self.points[:, :2].astype(float)
-        row, column = self.cells(turned[:, 0], turned[:, 1])
-        return bool(np.linalg.norm(self.nearest[row, column], axis=-1).max() < 0.3)
+        beside, _ = self.to_paint(turned[:, 0], turned[:, 1])
+        return bool(np.linalg.norm(beside, axis=0).max() < 0.3)
 
 
 def _resampled(line: Marking, step: float) -> Array:

@@ -221,7 +221,7 @@ def _is_likely_in_place(sought: SoughtCamera, best: Candidate) -> bool:
 
 def sees_all_of_its_frame(lens: Lens) -> bool:
     """True if each pixel of the frame has a ray: if the model grows as far as to the corners."""
-    return bool(np.isfinite(lens.undistort(lens.border(20))).all())
+    return bool(np.isfinite(lens.directions(lens.border(20))).all())
 
 
 def explains_nearly_as_well(other: Candidate, best: Candidate) -> bool:

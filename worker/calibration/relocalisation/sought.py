@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from worker.calibration.geometry.camera import Array
 from worker.calibration.geometry.ignored_areas import Ignored
 from worker.calibration.geometry.lens import Intrinsics, Lens
+from worker.calibration.geometry.panorama import Panorama
 
 Side = Literal["near", "far", "left", "right"]
 """Sides of the field: near is y < 0, far y > 0, left x < 0, right x > 0."""
@@ -19,17 +20,23 @@ apart from those of another whatever their focal length; the others are tried wh
 camera has -0.2, and from there a pose is caught that was proposed with -0.14."""
 
 
+LARGEST_KNOWN = 0.02
+"""Relative sigma of a focal length that needs no search."""
+
+
 @dataclass(frozen=True)
 class SoughtLens:
     """Lens through which a frame may have been taken, with a focal length between `shortest_px` and `longest_px`.
 
-    `is_bend_known`: True if it bends the picture as `lens` does, False if only about so.
+    `is_bend_known`: True if it bends the picture as `lens` does, False if only about so; `is_guess`: True for one of
+    several lenses that are close enough to the true one for a pose to be found, and then the lens with it.
     """
 
     lens: Lens
     shortest_px: float
     longest_px: float
     is_bend_known: bool = True
+    is_guess: bool = False
 
     @classmethod
     def known(cls, lens: Lens) -> "SoughtLens":
@@ -39,9 +46,10 @@ class SoughtLens:
     @classmethod
     def around(cls, lens: Lens, uncertain: float) -> "SoughtLens":
         """Return a lens with this relative sigma of its focal length, which a small one makes known."""
-        # Relative sigma of a focal length that needs no search.
-        if uncertain <= 0.02:
+        if uncertain <= LARGEST_KNOWN:
             return cls.known(lens)
+        if isinstance(lens, Panorama):
+            return replace(cls.known(lens), is_guess=True)
         reach = 1 + 2.0 * uncertain
         return cls(lens, lens.focal_length_px / reach, lens.focal_length_px * reach)
 
@@ -103,7 +111,7 @@ class SoughtCamera:
     @property
     def is_lens_sought(self) -> bool:
         """True if the lens is to be found along with the pose."""
-        return not all(one.is_known for one in self.lenses)
+        return any(one.is_guess or not one.is_known for one in self.lenses)
 
 
 def unknown_lenses(size: tuple[int, int], bends: Sequence[float] = BENDS) -> list[SoughtLens]:
@@ -120,6 +128,27 @@ def lenses_of_view(
     """Return lenses of each bend for a horizontal field of view with this relative sigma of the focal length."""
     focal = size[0] / 2 / float(np.tan(np.radians(field_of_view_deg) / 2))
     return [replace(SoughtLens.around(_bent(size, focal, bend), uncertain), is_bend_known=False) for bend in bends]
+
+
+def panorama_of_view(size: tuple[int, int], model: type[Panorama], field_of_view_deg: float) -> Panorama:
+    """Return a panorama of this horizontal field of view, its horizon in the middle."""
+    width, height = size
+    focal = width / float(np.radians(field_of_view_deg))
+    matrix = np.array([[focal, 0.0, (width - 1) / 2], [0.0, focal, (height - 1) / 2], [0.0, 0.0, 1.0]])
+    return model(matrix, np.zeros(0), size)
+
+
+def guessed_panoramas(lens: Panorama, uncertain: float) -> list[SoughtLens]:
+    """Return guesses at a panorama with this relative sigma of its focal length, which bends lines as no other does."""
+    if uncertain <= LARGEST_KNOWN:
+        return [SoughtLens.known(lens)]
+    # Ratio of neighbours: of two poses through them, one is caught by the lines through the true lens.
+    steps = int(np.ceil(np.log(1 + 2 * uncertain) / np.log(1.06)))
+    zooms = (1 + 2 * uncertain) ** np.linspace(-1, 1, 2 * steps + 1)
+    return [
+        SoughtLens.around(replace(lens, matrix=lens.matrix * [[zoom, 1, 1], [1, zoom, 1], [1, 1, 1]]), uncertain)
+        for zoom in zooms
+    ]
 
 
 def _bent(size: tuple[int, int], focal: float, bend: float) -> Intrinsics:

@@ -31,13 +31,14 @@ def surroundings():
 @cache
 def frames():
     """A pitch and its surroundings, from a camera that has turned a little in each frame."""
-    pixels = np.stack(np.meshgrid(np.arange(960.0), np.arange(540.0)), axis=-1)
+    # One of every four a side, in the middle of its neighbours: lenses bend the picture slowly.
+    pixels = np.stack(np.meshgrid(np.arange(1.5, 960.0, 4), np.arange(1.5, 540.0, 4)), axis=-1)
     pictures = []
     for turn in TURNS:
         one = moved(ON_A_MAST, np.concatenate([turn, np.zeros(3)]))
         # The camera only turns: what it sees depends on the direction alone.
         direction = one.rays(pixels) @ ON_A_MAST.pose.matrix.T
-        at = (100 * direction[..., :2] / direction[..., 2:] + 200).astype(np.float32)
+        at = cv2.resize((100 * direction[..., :2] / direction[..., 2:] + 200).astype(np.float32), (960, 540))
         beside = cv2.remap(surroundings(), at[..., 0], at[..., 1], cv2.INTER_CUBIC, borderMode=cv2.BORDER_REFLECT)
         pictures.append(np.clip(paint_frame(PITCH, one) + beside[..., None], 0, 255).astype(np.uint8))
     return tuple(pictures)

@@ -72,6 +72,7 @@ def everywhere(frame):
     return [Region(left, 0, min(left + 416, width), height) for left in range(0, width, 416)]
 
 
+@pytest.mark.long
 def test_tiled_equals_whole(segmenter, picture):
     height, width = 512, 928
     frame = picture[:height, :width]
@@ -84,6 +85,7 @@ def test_tiled_equals_whole(segmenter, picture):
     assert np.abs(tiled[inner] / 255 - whole[inner]).max() < 0.5 / 255 + 1e-4
 
 
+@pytest.mark.long
 def test_the_number_of_threads_changes_nothing(segmenter, picture):
     two = Segmenter(MODEL_BESIDE_THE_CODE, threads=2)
     np.testing.assert_array_equal(two(picture, everywhere(picture)), segmenter(picture, everywhere(picture)))

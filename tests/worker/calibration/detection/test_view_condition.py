@@ -94,6 +94,7 @@ def test_a_little_out_of_focus_is_usable(fair):
     assert look_at(spoiling.defocused(fair, 1.0), PITCH, STORED).usable
 
 
+@pytest.mark.long
 def test_what_is_soft_for_one_camera_is_usual_for_another(fair):
     soft = spoiling.defocused(fair, 1.4)
     of_sharp, of_soft = (look_at(frame, PITCH, STORED).figures for frame in (fair, soft))

@@ -62,6 +62,7 @@ def test_true_poses_agree() -> None:
     assert found.support > 60
 
 
+@pytest.mark.long
 def test_cameras_that_face_each_other_agree_in_spite_of_opposite_smears() -> None:
     # The smear of a small picture's far pixels is 40 cm long here; at four times the size 0.005 px remain.
     assert register(LEFT, FACING).error_px < 0.2
@@ -89,6 +90,7 @@ def test_what_other_poses_make_of_the_same_views_is_told_without_looking_again(s
     )
 
 
+@pytest.mark.long
 def test_four_metres_apart_is_within_reach() -> None:
     # 2.6 degrees too high: the whole of what a bad Start has.
     believed = moved(RIGHT, rotation=(0.016, 0.0, 0.0))
@@ -97,12 +99,14 @@ def test_four_metres_apart_is_within_reach() -> None:
     assert register(LEFT, believed).error_px == pytest.approx(true, rel=0.05)
 
 
+@pytest.mark.long
 def test_the_order_of_the_cameras_only_turns_the_sign() -> None:
     believed = moved(RIGHT, rotation=(0.003, 0.001, 0.0))
     one, other = register(LEFT, believed), register(believed, LEFT)
     assert (one.dx_px, one.dy_px) == pytest.approx((-other.dx_px, -other.dy_px), abs=1e-6)
 
 
+@pytest.mark.long
 def test_cameras_on_one_side_hide_a_crown_and_cameras_on_two_sides_show_it() -> None:
     assert register(LEFT, RIGHT, PITCH, crowned=True).error_px < 1.0
     assert register(LEFT, FACING, PITCH, crowned=True).error_px > 15.0
@@ -119,6 +123,7 @@ def test_along_a_lone_halfway_line_nothing_is_told() -> None:
     assert abs(found.dy_px) < 0.1
 
 
+@pytest.mark.long
 def test_players_do_not_pull() -> None:
     random = np.random.default_rng(3)
     masks = []
@@ -144,6 +149,7 @@ def test_a_camera_that_sees_no_marking_cannot_be_compared() -> None:
     assert register_pair(PITCH, LEFT, RIGHT, black, black) is None
 
 
+@pytest.mark.long
 def test_noise_is_no_marking() -> None:
     random = np.random.default_rng(1)
     noise = [random.uniform(0, 0.3, (540, 960)).astype(np.float32) for _ in (LEFT, RIGHT)]

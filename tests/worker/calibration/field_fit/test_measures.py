@@ -41,6 +41,16 @@ def centre_only():
     return fitted(PITCH, [one], Field(104.0, 67.5))
 
 
+def test_a_court_that_is_shorter_and_narrower_than_said_is_found():
+    truth, given = Field(23.7, 10.9, 0.05, template=load("tennis")), Field(23.77, 10.97, 0.05, template=load("tennis"))
+    refined, measures = fitted(truth, [camera("whole", (0.0, -11.0, 6.0), (0.0, -1.0), focal=420.0)], given)
+    for name, real in (("length_m", 23.7), ("width_m", 10.9)):
+        assert measures[name].known, name
+        assert abs(measures[name].value - real) < 3 * measures[name].sigma < 0.03, name
+    assert (refined.pitch.length, refined.pitch.width) == (measures["length_m"].value, measures["width_m"].value)
+
+
+@pytest.mark.long
 def test_a_pitch_that_is_shorter_narrower_and_flatter_than_said_is_found():
     refined, measures = whole_pitch()
     truth = {"length_m": 105.0, "width_m": 68.0, "ridge_height_m": 0.35, "ridge_length_m": 37.0}
@@ -54,6 +64,7 @@ def test_a_pitch_that_is_shorter_narrower_and_flatter_than_said_is_found():
         assert np.linalg.norm(before.pose.position - after.pose.position) < 0.1
 
 
+@pytest.mark.long
 def test_the_sigmas_of_what_is_found_are_worth_having():
     _, measures = whole_pitch()
     assert measures["length_m"].sigma < 0.2

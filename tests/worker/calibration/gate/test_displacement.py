@@ -73,6 +73,7 @@ def test_the_shift_is_positive_to_the_right_and_away_from_the_camera():
         assert found.shift == pytest.approx(expected, abs=1e-6)
 
 
+@pytest.mark.long
 def test_sigma_is_that_of_the_pose_at_that_place():
     rng = np.random.default_rng(3)
     root = rng.normal(size=(6, 6)) * np.repeat([2e-5, 3e-3], 3)[:, None]

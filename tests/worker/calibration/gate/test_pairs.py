@@ -95,6 +95,7 @@ def test_two_that_others_hold_and_that_share_little_have_no_say_in_the_stitch_er
     assert stitch_error_px([pair("ab", 0.2), pair("bc", 0.3), pair("ac", 2.0, plenty=False)]) == 0.3
 
 
+@pytest.mark.long
 def test_of_three_in_a_row_the_neighbours_are_compared() -> None:
     masks = [paint_markings(PITCH, one) for one in row()]
     agreeing = compare_pairs(PITCH, [seeing(*each) for each in zip(row(), masks, strict=True)])

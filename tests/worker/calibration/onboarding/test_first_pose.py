@@ -71,7 +71,7 @@ def far(found, camera=CAMERA):
     )
 
 
-@settings(max_examples=3)
+@settings(max_examples=2)
 @given(st.floats(-30, 30), st.floats(4, 25), st.floats(-25, 25), st.floats(-3, 3))
 def test_the_pose_of_a_camera_anywhere_beside_the_pitch_is_found(aside, height, target, roll):
     camera = CAMERA.with_pose(Pose.looking_at([aside, -46.0, height], [target, 0.0, 0.0], roll))
@@ -102,6 +102,7 @@ def test_four_points_are_enough_and_it_is_said_what_they_cannot_tell():
     assert "8 or more" in found.warnings[0]
 
 
+@pytest.mark.long
 def test_heights_above_the_ground_count():
     posts = np.array([[-52.5, y, 2.44] for y in (-3.66, 3.66)] + [[-52.5, y, 0.0] for y in (-3.66, 3.66)])
     given_ = Clicks(("a", "b", "c", "d"), posts, CAMERA.project(posts))
@@ -129,6 +130,7 @@ def test_two_exchanged_labels_are_named_and_undone(names, noise_px, pair):
     assert far(found) == pytest.approx(far(first_pose(right, LENS, NAMED)), abs=0.02)
 
 
+@pytest.mark.long
 def test_two_pairs_of_exchanged_labels_are_told_apart():
     found = first_pose(clicks(noise_px=1.0).swapped(0, 3).swapped(5, 8), LENS, NAMED)
     assert sum(click.exchanged_with is not None for click in found.clicks) == 4
@@ -332,11 +334,13 @@ def test_a_lens_that_was_freed_is_as_well_known_as_the_points_tell_it():
     }
 
 
+@pytest.mark.long
 def test_a_lens_that_is_left_alone_is_as_well_known_as_before():
     known = replace(LENS, sigma={"fx": 3.0})
     assert first_pose(clicks(noise_px=1.5), known, NAMED).camera.intrinsics.sigma == {"fx": 3.0}
 
 
+@pytest.mark.long
 def test_a_wrong_lens_and_exchanged_labels_are_told_apart():
     wrong = clicks(noise_px=1.5).swapped(2, 9)
     found = first_pose(wrong, WRONG, NAMED)
@@ -356,6 +360,7 @@ def test_too_few_points_change_no_lens():
     assert first_pose(clicks(SOME[:5], noise_px=1.0), WRONG, NAMED).lens is None
 
 
+@pytest.mark.long
 def test_a_fisheye_is_located_and_corrected_like_any_lens():
     camera = Camera("dome", DOME, Pose.looking_at([1.0, -44.0, 10.0], [-10.0, -5.0, 0.0]))
     given_ = clicks(camera=camera, noise_px=1.0)

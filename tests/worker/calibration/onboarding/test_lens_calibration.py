@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from testbed.parameters import try_first
-from worker.calibration.geometry.lens import LENSES
+from worker.calibration.geometry.lens_models import LENSES
 from worker.calibration.geometry.rotation import rotation_matrices
 from worker.calibration.onboarding.boards import Board, BoardDetection, Charuco, find_board, other_size
 from worker.calibration.onboarding.lens_calibration import (
@@ -93,9 +93,10 @@ def paper(board):
 
 @cache
 def rays():
-    """Of each pixel (H, W, 3), at depth 1."""
-    x, y = np.meshgrid(np.arange(SIZE[0]), np.arange(SIZE[1]))
-    return np.concatenate([PINHOLE.undistort(np.stack([x, y], axis=-1)), np.ones((*x.shape, 1))], axis=-1)
+    """Of each pixel (H, W, 3), at depth 1; between those of every fourth one the lens bends them evenly."""
+    x, y = np.meshgrid(np.arange(1.5, SIZE[0], 4), np.arange(1.5, SIZE[1], 4))
+    slopes = cv2.resize(PINHOLE.undistort(np.stack([x, y], axis=-1)), SIZE)
+    return np.concatenate([slopes, np.ones((*SIZE[::-1], 1))], axis=-1)
 
 
 def photograph(board, tilt, middle, blur_px=0.7):
@@ -137,6 +138,7 @@ def test_a_photo_without_a_board_shows_none_and_squares_taken_for_corners_are_no
     assert other_size(photo, Board(10, 7, 0.03)) == (9, 6)
 
 
+@pytest.mark.long
 def test_blur_is_measured():
     tilt, middle = np.array([0.2, 0.1, 0.0]), np.array([0.0, 0.0, 0.45])
     sharp, soft = (find_board(photograph(BOARD, tilt, middle, blur_px=blur), BOARD).edge_px for blur in (0.7, 4.0))
@@ -193,6 +195,7 @@ def test_a_principal_point_that_was_left_in_the_middle_is_known_as_well_as_photo
     assert set(found.sigma) == {"f", "k1"}
 
 
+@pytest.mark.long
 def test_how_well_the_ratio_of_both_focal_lengths_is_known_is_told_where_both_are_free(monkeypatch):
     monkeypatch.setitem(LADDERS, "fisheye", LADDERS["fisheye"][:1])
     sigma = calibrate_lens(photos("fisheye", count=6), "fisheye").lens.sigma
@@ -253,6 +256,7 @@ def test_cells_and_ninths_are_counted_where_corners_are():
     assert set(coverage.empty) & {"top left", "bottom right"} == set()
 
 
+@pytest.mark.long
 def test_the_picture_shows_bare_cells_corners_and_the_principal_point():
     found = from_the_left()
     picture = coverage_picture(found)

@@ -59,6 +59,7 @@ def test_a_black_frame_leaves_its_camera_at_the_stored_pose():
     np.testing.assert_array_equal(found.cameras[1].camera.pose.position, outdated()[1].pose.position)
 
 
+@pytest.mark.long
 def test_black_frames_alone_are_searched_for_by_nobody():
     dark = {name: (np.zeros_like(several[0]),) for name, several in frames().items()}
     found = calibrate_by_paper(PRESETS["paper"], CROWNED, outdated(), dark, white_on_green, FEW)

@@ -2,6 +2,7 @@
 
 import pytest
 
+from testbed.parameters import try_first
 from testbed.synthetic import CROWNED, moved, pair, pair_markings
 from worker.calibration.paper.ground_objective import BROAD, NARROW, GroundObjective
 from worker.calibration.search.genome import genome_of
@@ -15,7 +16,7 @@ def loss(objective, cameras):
     return float(objective.losses(genome_of(cameras)[None])[0])
 
 
-@pytest.mark.parametrize("blurs", [BROAD, NARROW])
+@pytest.mark.parametrize("blurs", try_first([BROAD, NARROW]))
 def test_the_papers_objective_prefers_the_truth_too(blurs):
     cameras, responses = scene()
     objective = GroundObjective(CROWNED, cameras, responses, 0.5, blurs)

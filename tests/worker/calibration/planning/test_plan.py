@@ -71,6 +71,7 @@ def test_a_mirrored_venue_has_the_mirrored_map(x, height, aim):
     assert there.pairs[0].stitch_m == pytest.approx(here.pairs[0].stitch_m, rel=0.01)
 
 
+@pytest.mark.long
 def test_a_calibration_errs_by_what_was_expected():
     """Lens, ground, paint and noise drawn as large as a plan takes them to be; lines measured without pictures."""
     rng = np.random.default_rng(5)

@@ -68,3 +68,14 @@ def test_a_lone_line_is_warned_of_as_the_gate_would_refuse_it():
     found = {kind for kind, *_ in kinds([lone_line()])}
     assert found & set(REFUSED)
     assert not {kind for kind, *_ in kinds(pair())} & set(REFUSED)
+
+
+def test_a_plan_with_two_cameras_moved_is_the_plan_of_all_at_their_new_poses():
+    cameras = chain()
+    moved = {0: panned(cameras[0], -3.0), 2: raised(cameras[2], 1.0)}
+    of_changes = plan(PITCH, cameras, FRESH).planner.with_moved(moved).plan()
+    anew = plan(PITCH, [moved.get(number, camera) for number, camera in enumerate(cameras)], FRESH)
+    for one, other in zip(of_changes.cameras, anew.cameras, strict=True):
+        np.testing.assert_allclose(one.place_m, other.place_m, rtol=1e-12)
+        np.testing.assert_array_equal(one.line_m, other.line_m)
+    assert [pair.stitch_m for pair in of_changes.pairs] == pytest.approx([pair.stitch_m for pair in anew.pairs])

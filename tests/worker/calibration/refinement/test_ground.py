@@ -54,6 +54,7 @@ def test_in_a_hall_errors_are_as_large_as_the_sigmas_say():
     assert 0.4 < np.sqrt(np.mean([(off_m(end) / end.sigma.position_m) ** 2 for end in ends])) < 1.5
 
 
+@pytest.mark.long
 def test_a_floor_leaves_less_doubt_than_turf_would():
     as_turf = replace(HALL, template=replace(HALL.template, uneven=TURF_M))
     rng = np.random.default_rng(3)

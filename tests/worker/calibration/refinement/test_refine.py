@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from fields.template import Template
-from testbed.parameters import try_first
 from testbed.synthetic import (
     BARREL,
     CROWNED,
@@ -156,6 +155,7 @@ def test_the_error_is_of_the_size_of_its_sigma():
         assert np.sqrt(np.diag(after.covariance)[3:]).max() < 0.1
 
 
+@pytest.mark.long
 def test_the_stitch_term_holds_together_what_a_wrong_lens_pulls_apart():
     cameras = pair()
     responses = pair_markings()
@@ -204,7 +204,7 @@ def test_an_outlier_has_no_weight_and_the_rest_have_theirs():
     assert (weights[:4] > 0.9).all()
 
 
-@pytest.mark.parametrize("distortion", [(), BARREL])
+@pytest.mark.parametrize("distortion", [BARREL, pytest.param((), marks=pytest.mark.long)])
 def test_a_lone_touchline_neither_lets_a_camera_run_away_nor_makes_it_sure(distortion):
     one = lone_line(distortion)
     refined = refine(CROWNED, [moved(one, by=(0.2, 0.0, 0.0))], observed(CROWNED, [one]), 0.5)
@@ -213,6 +213,7 @@ def test_a_lone_touchline_neither_lets_a_camera_run_away_nor_makes_it_sure(disto
     assert refined.each[0].sigma.position_m > GATE.largest_ground_sigma_m
 
 
+@pytest.mark.long
 def test_the_ends_of_hash_marks_hold_a_camera_that_sees_only_lines_of_one_direction():
     yards = [{"name": f"line {x}", "line": [[x, -24], [x, 24]]} for x in (-9, -4.5, 0, 4.5, 9)]
     marks = [
@@ -266,7 +267,8 @@ def test_a_focal_length_that_is_left_free_is_found_with_the_pose():
     assert found.pitch is CROWNED
 
 
-@pytest.mark.parametrize("start", try_first([0.1, 0.5]))
+@pytest.mark.long
+@pytest.mark.parametrize("start", [0.1, 0.5])
 def test_a_ridge_that_is_left_free_is_found_with_the_poses(start):
     wrong = CROWNED.raised(start - 0.35)
     found = refine(wrong, pair(), pair_observed(), 0.5, free_ridge(wrong))

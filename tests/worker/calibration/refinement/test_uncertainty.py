@@ -79,6 +79,7 @@ def without_heat(monkeypatch):
     monkeypatch.setattr(priors, "HEAT_FOCAL", 1e-9)
 
 
+@pytest.mark.long
 def test_however_well_a_focal_length_was_measured_heat_may_have_moved_it(monkeypatch):
     warm = said_of_a_corner(fx=0.1)
     assert said_of_a_corner(fx=0.01) == pytest.approx(warm, rel=0.01)
@@ -89,6 +90,7 @@ def test_however_well_a_focal_length_was_measured_heat_may_have_moved_it(monkeyp
     assert np.sqrt(warm**2 - cold**2) == pytest.approx(47 * heat, rel=0.4)
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("without_heat")
 def test_the_worse_the_focal_length_is_known_the_less_sure_is_where_a_camera_stands_that_sees_little():
     well, badly, hardly = (said_of_a_corner(fx=fx) for fx in (0.1, 30.0, 150.0))

@@ -24,18 +24,19 @@ LOPSIDED = Field(
 
 def test_every_point_lies_on_paint():
     markings = FieldMap.of(PITCH)
-    row, column = markings.cells(*markings.points[:, :2].T.astype(float))
-    assert np.linalg.norm(markings.nearest[row, column], axis=1).max() < 2 * markings.cell_m
+    beside, _ = markings.to_paint(*markings.points[:, :2].T.astype(float))
+    assert np.linalg.norm(beside, axis=0).max() < 2 * markings.cell_m
 
 
 def test_places_beside_the_field_are_as_far_from_paint_as_they_are():
     markings = FieldMap.of(PITCH)
-    ((row,), (column,)) = markings.cells(np.array([0.0]), np.array([-38.0]))
-    assert np.linalg.norm(markings.nearest[row, column]) == pytest.approx(4.0, abs=3 * markings.cell_m)
+    beside, _ = markings.to_paint(np.array([0.0]), np.array([-38.0]))
+    assert np.linalg.norm(beside) == pytest.approx(4.0, abs=3 * markings.cell_m)
 
 
-def test_places_beyond_the_map_have_no_cell():
-    assert FieldMap.of(PITCH).cells(np.array([500.0]), np.array([0.0])) == (np.array([-1]), np.array([-1]))
+def test_places_beyond_the_map_are_not_on_it():
+    _, on_map = FieldMap.of(PITCH).to_paint(np.array([500.0, 0.0]), np.array([0.0, 0.0]))
+    assert on_map.tolist() == [False, True]
 
 
 def test_straight_lines_are_known_by_where_they_run():

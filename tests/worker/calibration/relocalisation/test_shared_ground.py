@@ -54,6 +54,7 @@ def test_the_camera_that_sees_the_most_alike_is_named():
     assert compared.others[0] == "right"
 
 
+@pytest.mark.long
 def test_mown_stripes_which_look_alike_from_many_poses_decide_nothing():
     poses = [moved(LEFT, by=(by_m, 0, 0)) for by_m in (20.0, 10.0, -10.0)]
     assert ground(LEFT, RIGHT, shaded=mown).compare(poses, [RIGHT]).right is None

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from testbed.parameters import try_first
 from testbed.synthetic import (
     CROWNED,
     GRASS,
@@ -58,8 +59,13 @@ def halfway(view: StitchedView, y: float) -> Array:
     return view.project(CROWNED.lift(np.array([0.0, y])))
 
 
+@cache
+def true_preview() -> NDArray[np.uint8]:
+    return preview(CROWNED, CAMERAS, frames(), 1200)
+
+
 def test_the_preview_shows_the_pitch_where_its_viewpoint_says() -> None:
-    picture = preview(CROWNED, CAMERAS, frames(), 1200)
+    picture = true_preview()
     view = chosen_view(CROWNED, CAMERAS, ViewChoice(width=1200))
     assert picture.shape == (view.size[1], 1200, 3)
     for y in (-25.0, -15.0, 5.0):
@@ -71,7 +77,7 @@ def test_the_preview_shows_the_pitch_where_its_viewpoint_says() -> None:
 
 def test_a_preview_of_true_poses_shows_one_halfway_line() -> None:
     view = chosen_view(CROWNED, CAMERAS, ViewChoice(width=1200))
-    picture = preview(CROWNED, CAMERAS, frames(), 1200)
+    picture = true_preview()
     x, y = halfway(view, -25.0)
     assert lines_across(picture, round(y), slice(round(x) - 60, round(x) + 60)) == 1
 
@@ -86,7 +92,7 @@ def test_a_preview_of_wrong_poses_shows_two() -> None:
 
 
 def test_the_preview_has_no_hole_in_it() -> None:
-    picture = preview(CROWNED, CAMERAS, frames(), 1200)
+    picture = true_preview()
     unseen = (picture == BACKDROP).all(axis=-1)
     assert unseen.mean() < 0.02
     height, width = unseen.shape
@@ -136,7 +142,8 @@ def test_the_geometry_of_the_preview_is_exact_to_a_twentieth_of_a_pixel() -> Non
         assert np.quantile(np.linalg.norm(exact - quick, axis=-1)[judged], 0.999) < 0.05
 
 
-@pytest.mark.parametrize("count", try_first([3, 1]))
+@pytest.mark.long
+@pytest.mark.parametrize("count", [3, 1])
 def test_any_number_of_cameras_in_a_row(count: int) -> None:
     cameras = row() if count == 3 else row()[1:2]
     pictures = {one.id: paint_frame(CROWNED, one) for one in cameras}
@@ -147,6 +154,7 @@ def test_any_number_of_cameras_in_a_row(count: int) -> None:
     assert birdseye(CROWNED, cameras, pictures).shape == (741, 1111, 3)
 
 
+@pytest.mark.long
 def test_cameras_that_face_each_other_are_seen_from_outside() -> None:
     facing = [
         camera("near", (0.0, -55.0, 15.0), (0.0, 0.0), focal=450.0),

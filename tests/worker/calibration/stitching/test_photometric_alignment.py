@@ -90,6 +90,7 @@ def test_cameras_that_agree_are_left_as_they_are():
         assert abs(light.falloff) < 0.02
 
 
+@pytest.mark.long
 def test_players_who_stand_in_one_view_of_the_overlap_move_nothing():
     frames = textured()
     empty = evened_out(CROWNED, CAMERAS, frames)

@@ -1,0 +1,41 @@
+"""`esc mcp`: a service for assistants, by the Model Context Protocol on standard input and output."""
+
+import asyncio
+import sys
+from importlib.util import find_spec
+from typing import Annotated
+
+import typer
+
+from service import build
+from service.cli.arguments import DEFAULT_URL, ApiKey, Url
+from service.cli.printing import FAILED, fail
+from service.client import AsyncClient
+
+
+def mcp(
+    allow_storing: Annotated[
+        bool,
+        typer.Option(
+            "--allow-storing",
+            envvar="ESC_MCP_ALLOW_STORING",
+            help="Let assistants store poses of dry runs, as far as the quality gate has accepted them.",
+        ),
+    ] = False,
+    url: Url = DEFAULT_URL,
+    api_key: ApiKey = None,
+) -> None:
+    """Serve assistants by the Model Context Protocol: they read venues and propose calibrations. Needs the extra `mcp`.
+
+    A program of an assistant starts it and speaks with it over standard input and output. A key of scope `read` lets
+    it read, one of scope `calibrate` propose.
+    """
+    if find_spec("mcp") is None:
+        fail(f"It needs the extra `mcp`: {build.install_command('mcp', sys.executable)}", FAILED)
+    from service.cli.mcp_tools import server_of
+
+    async def serve() -> None:
+        async with AsyncClient(url, api_key) as client:
+            await server_of(client, may_store=allow_storing).run_stdio_async()
+
+    asyncio.run(serve())

@@ -1,0 +1,146 @@
+"""The bench for fixed cameras: what a set holds, and what answers count."""
+
+import json
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from benchmarks.fccb.__main__ import main
+from benchmarks.fccb.scoring import overall, score
+from benchmarks.fccb.sets import Case, CaseSet, TrueCamera, Truth, camera_to_schema, field_to_schema
+from service.formats import soccernet
+from service.formats.lens import NumberedCamera
+from service.schemas.find import SoughtSite
+from testbed.synthetic import PITCH, camera, moved, pair
+from worker.calibration.relocalisation.relocalise import twin
+
+EXAMPLE = Path("benchmarks/fccb/example/answer.py")
+TURN = (0.0, 0.05, 0.0)
+
+
+def a_set(folder, real, *, stored=None, task="keep", shows_field=True):
+    """A set of one case, of one moment."""
+    cases = CaseSet(folder)
+    cameras = [camera_to_schema(one).model_dump(exclude_none=True) for one in stored or real]
+    for one in cameras:
+        del one["pose"]["translation"]
+    field = field_to_schema("football", replace(PITCH, sigma={}))
+    site = SoughtSite.model_validate({"id": "one", "field": field.model_dump(exclude_none=True), "cameras": cameras})
+    files = {one.id: f"{one.id}.jpg" for one in real}
+    truth = [TrueCamera(camera=camera_to_schema(one), shows_field=shows_field) for one in real]
+    frames = {file: np.zeros((8, 8, 3), np.uint8) for file in files.values()}
+    cases.write("one", Case(task=task, site=site, moments=[files]), Truth(field=field, moments=[truth]), frames)
+    return cases
+
+
+def answered(folder, *cameras, **other):
+    """A folder of answers that puts the cameras where they stand."""
+    folder.mkdir()
+    said = [{"id": one.id, "pose": pose(one), **other} for one in cameras]
+    (folder / "one.json").write_text(json.dumps({"moments": [{"cameras": said}]}))
+    return folder
+
+
+def pose(one):
+    return {"rotation": one.pose.rotation.tolist(), "position": one.pose.position.tolist()}
+
+
+@pytest.mark.parametrize(
+    ("turned", "accepted", "shows_field", "points"),
+    [
+        (False, True, True, 100),
+        (False, False, True, 0),
+        (True, True, True, -1000),
+        (True, False, True, 0),
+    ],
+)
+def test_a_wrong_pose_that_is_accepted_costs_ten_refusals(tmp_path, turned, accepted, shows_field, points):
+    real = camera("a", (0, -48, 10), (0, 0))
+    cases = a_set(tmp_path / "set", [real], shows_field=shows_field)
+    answers = answered(tmp_path / "answers", moved(real, TURN) if turned else real, accepted=accepted)
+    assert score(cases, answers)["keep"].points == points
+
+
+@pytest.mark.parametrize(("turned", "points"), [(False, 0), (True, -10)])
+def test_a_frame_without_its_field_brings_nothing_and_can_cost(tmp_path, turned, points):
+    real = camera("a", (0, -48, 10), (0, 0))
+    cases = a_set(tmp_path / "set", [real], shows_field=False)
+    answers = answered(tmp_path / "answers", moved(real, TURN) if turned else real, accepted=True)
+    assert [one.points for one in score(cases, answers)["keep"].verdicts] == [points]
+
+
+def test_half_a_turn_of_a_symmetric_field_counts_as_the_same(tmp_path):
+    real = camera("a", (0, -48, 10), (0, 0))
+    cases = a_set(tmp_path / "set", [real])
+    (verdict,) = score(cases, answered(tmp_path / "answers", twin(real), accepted=True))["keep"].verdicts
+    assert verdict.points == 1
+    assert verdict.error_m < 1e-9
+
+
+def test_a_case_without_an_answer_counts_as_refused(tmp_path):
+    cases = a_set(tmp_path / "set", [camera("a", (0, -48, 10), (0, 0))])
+    (tmp_path / "answers").mkdir()
+    assert overall(score(cases, tmp_path / "answers")) == 0
+
+
+def test_a_lens_of_the_answer_counts_in_place_of_the_cases(tmp_path):
+    real = camera("a", (0, -48, 10), (0, 0))
+    longer = camera("a", (0, -48, 10), (0, 0), focal=660.0)
+    cases = a_set(tmp_path / "set", [real], stored=[longer])
+    given = score(cases, answered(tmp_path / "given", real, accepted=True))["keep"]
+    lens = camera_to_schema(real).intrinsics.model_dump(exclude_none=True)
+    found = score(cases, answered(tmp_path / "found", real, accepted=True, intrinsics=lens))["keep"]
+    assert (given.points, found.points) == (-1000, 100)
+
+
+def test_rigs_are_scored_by_where_two_cameras_put_common_lines(tmp_path):
+    left, right = pair()
+    cases = a_set(tmp_path / "set", [left, right], task="rigs")
+    exact = score(cases, answered(tmp_path / "exact", left, right, accepted=True))["rigs"]
+    beside = moved(right, by=(0.02, 0.0, 0.0))
+    off = score(cases, answered(tmp_path / "off", left, beside, accepted=True))["rigs"]
+    assert exact.stitch_cm == pytest.approx([0.0], abs=1e-6)
+    assert off.stitch_cm == pytest.approx([2.0], abs=1e-6)
+
+
+def test_a_program_that_knows_nothing_of_esc_answers_a_set(tmp_path, capsys):
+    real = camera("a", (0, -48, 10), (0, 0))
+    a_set(tmp_path / "set", [real])
+    command = f"{sys.executable} {EXAMPLE} {{cases}} {{answers}}"
+    folders = [str(tmp_path / "set"), str(tmp_path / "answers")]
+    assert main(["answer", *folders, "--command", command]) == 0
+    assert main(["score", *folders]) == 0
+    assert "| answers | all | 100 |" in capsys.readouterr().out
+
+
+def test_frames_of_ones_own_become_cases_whose_truth_is_the_calibration(tmp_path):
+    real = camera("a", (0, -48, 10), (0, 0))
+    calibration = tmp_path / "soccernet.json"
+    calibration.write_bytes(soccernet.write(NumberedCamera(camera_to_schema(real), 1)))
+    cv2.imwrite(str(tmp_path / "a.png"), np.zeros((540, 960, 3), np.uint8))
+    given = ["--name", "arena", "--sport", "football", "--calibration", str(calibration)]
+    main(["import", str(tmp_path / "set"), f"a={tmp_path / 'a.png'}", *given])
+    cases = CaseSet(tmp_path / "set")
+    assert cases.names == ["find-arena-a", "keep-arena-a"]
+    exact = answered(tmp_path / "answers", real, accepted=True)
+    for name in cases.names:
+        (exact / f"{name}.json").write_text((exact / "one.json").read_text())
+    assert overall(score(cases, exact)) == 100
+    assert cases.case("find-arena-a").site.cameras[0].pose is None
+
+
+@pytest.mark.long
+def test_a_seed_makes_the_same_set_again_and_another_one_another(tmp_path):
+    numbers = ["--keep", "1", "--find", "1", "--nights", "0", "--rigs", "0"]
+    for folder, seed in (("a", 1), ("b", 1), ("c", 2)):
+        main(["make", str(tmp_path / folder), "--seed", str(seed), *numbers])
+    files = [
+        {path.relative_to(tmp_path / folder): path.read_bytes() for path in (tmp_path / folder).rglob("*.*")}
+        for folder in "abc"
+    ]
+    assert files[0] == files[1]
+    assert all(files[2][path] != content for path, content in files[0].items() if path.suffix == ".jpg")
