@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import cv2
 import numpy as np
@@ -88,7 +89,7 @@ def _feather(seen: Sequence[NDArray[np.bool_]]) -> Weights:
     return list((far / np.maximum(far.sum(axis=0), 1e-9)).astype(np.float32))
 
 
-def _opencv(finder: object, shown: Sequence[NDArray[np.float32]], seen: Sequence[NDArray[np.bool_]]) -> Weights:
+def _opencv(finder: Any, shown: Sequence[NDArray[np.float32]], seen: Sequence[NDArray[np.bool_]]) -> Weights:
     height, width = seen[0].shape
     size = width // SHRINK, height // SHRINK
     small = [cv2.resize(one, size, interpolation=cv2.INTER_AREA) for one in shown]
