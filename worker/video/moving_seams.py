@@ -18,7 +18,7 @@ class MovingSeams:
     """Seams of a panorama that go around people in its `bands`. `weights` (H, W) by camera: where it may be shown."""
 
     def __init__(self, panorama: Panorama, bands: Sequence[SeamBand]) -> None:
-        self.weights = opened(panorama, bands)
+        self.weights: Sequence[NDArray[np.float32]] = opened(panorama, bands)
         self._bands = bands
         self._static = [_static_share(panorama, band) for band in bands]
         self._levels = [[_level(panorama.parts[number], band) for number in band.cameras] for band in bands]

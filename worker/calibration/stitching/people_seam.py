@@ -112,6 +112,7 @@ class SeamBand:
         self._noise = np.full(self.zone.shape, np.median(apart[on_turf]) if on_turf.any() else 0.0, np.float32)
 
     def _apart(self, difference: Values) -> Values:
+        assert self._ground is not None
         return np.asarray(cv2.transform(cv2.absdiff(difference, self._ground), np.ones((1, 3))), np.float32)
 
     def _learn(self, difference: Values, apart: Values, taken: Mask) -> None:
@@ -170,7 +171,7 @@ def shows_turf(pitch: Field, view: StitchedView) -> NDArray[np.bool_]:
     columns, rows = np.rint(pixels[inside(pixels, view.size)]).astype(int).T
     painted = np.zeros((view.size[1], view.size[0]), np.uint8)
     painted[rows, columns] = 1
-    return (every_pixel(on_pitch, view.size) > 0.5) & (cv2.dilate(painted, BESIDE_LINE) == 0)
+    return (every_pixel(np.asarray(on_pitch), view.size) > 0.5) & (cv2.dilate(painted, BESIDE_LINE) == 0)
 
 
 def seam_bands(made: Panorama, turf: NDArray[np.bool_], rate: float, border: float = FRAME_BORDER) -> list[SeamBand]:
@@ -197,8 +198,10 @@ def seam_bands(made: Panorama, turf: NDArray[np.bool_], rate: float, border: flo
         if zone.any():
             top_left, bottom_right = _with_border(zone)
             around = slice(top_left[0], bottom_right[0]), slice(top_left[1], bottom_right[1])
-            parts = [np.ascontiguousarray(mask[around], np.uint8) for mask in (zone, owner == j, turf[cells])]
-            found.append(SeamBand((i, j), cell, around, *parts, rate))
+            in_band, second, bare = (
+                np.ascontiguousarray(mask[around], np.uint8) for mask in (zone, owner == j, turf[cells])
+            )
+            found.append(SeamBand((i, j), cell, around, in_band, second, bare, rate))
     return found
 
 
@@ -215,7 +218,7 @@ def opened(made: Panorama, bands: Sequence[SeamBand]) -> list[NDArray[np.float32
 def _seam(owner: NDArray[np.int8], pair: tuple[int, int]) -> Mask:
     """1 in cells (h, w) beside the seam of two cameras."""
     around = np.ones((3, 3), np.uint8)
-    first, second = (np.asarray(cv2.dilate((owner == number).astype(np.uint8), around)) for number in pair)
+    first, second = (np.asarray(cv2.dilate((owner == number).astype(np.uint8), around), np.uint8) for number in pair)
     return first & second
 
 
