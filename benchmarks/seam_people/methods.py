@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import cv2
 import numpy as np
@@ -38,7 +39,7 @@ class Method:
         return found
 
 
-def methods(made: Panorama, pitch: NDArray[np.bool_]) -> list[Method]:
+def methods(made: Panorama, turf: NDArray[np.bool_]) -> list[Method]:
     """Return the seams of a panorama."""
     static = [part.weight for part in made.parts]
     seen = [inside(part.source, part.frame_size, 1.0) for part in made.parts]
@@ -48,7 +49,7 @@ def methods(made: Panorama, pitch: NDArray[np.bool_]) -> list[Method]:
         Method("feather", lambda _: feather),
         Method("DpSeamFinder", lambda shown: _opencv(cv2.detail.DpSeamFinder("COLOR_GRAD"), shown, seen)),
         Method("GraphCut", lambda shown: _opencv(cv2.detail.GraphCutSeamFinder("COST_COLOR_GRAD"), shown, seen)),
-        Method("people", _People(made, pitch)),
+        Method("people", _People(made, turf)),
     ]
 
 
@@ -64,8 +65,8 @@ def shown_by(made: Panorama, frames: Mapping[str, Frame]) -> list[NDArray[np.flo
 class _People:
     """The seams of `esc stitch --seam people`."""
 
-    def __init__(self, made: Panorama, pitch: NDArray[np.bool_]) -> None:
-        self._made, self._bands = made, seam_bands(made, pitch, RATE)
+    def __init__(self, made: Panorama, turf: NDArray[np.bool_]) -> None:
+        self._made, self._bands = made, seam_bands(made, turf, RATE)
 
     def __call__(self, shown: Sequence[NDArray[np.float32]]) -> Weights:
         weights = [part.weight.copy() for part in self._made.parts]
@@ -88,7 +89,7 @@ def _feather(seen: Sequence[NDArray[np.bool_]]) -> Weights:
     return list((far / np.maximum(far.sum(axis=0), 1e-9)).astype(np.float32))
 
 
-def _opencv(finder: object, shown: Sequence[NDArray[np.float32]], seen: Sequence[NDArray[np.bool_]]) -> Weights:
+def _opencv(finder: Any, shown: Sequence[NDArray[np.float32]], seen: Sequence[NDArray[np.bool_]]) -> Weights:
     height, width = seen[0].shape
     size = width // SHRINK, height // SHRINK
     small = [cv2.resize(one, size, interpolation=cv2.INTER_AREA) for one in shown]

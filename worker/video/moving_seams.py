@@ -18,24 +18,29 @@ class MovingSeams:
     """Seams of a panorama that go around people in its `bands`. `weights` (H, W) by camera: where it may be shown."""
 
     def __init__(self, panorama: Panorama, bands: Sequence[SeamBand]) -> None:
-        self.weights = opened(panorama, bands)
+        self.weights: Sequence[NDArray[np.float32]] = opened(panorama, bands)
         self._bands = bands
         self._static = [_static_share(panorama, band) for band in bands]
+        self._levels = [[_level(panorama.parts[number], band) for number in band.cameras] for band in bands]
         self.move(panorama)
 
     def move(self, panorama: Panorama) -> None:
         """Take the sampling maps of a panorama of which sources alone have moved."""
         self._samplers = [
-            [_Sampler.of(panorama.parts[number], band) for number in band.cameras] for band in self._bands
+            [
+                _Sampler.of(panorama.parts[number], band, level)
+                for number, level in zip(band.cameras, levels, strict=True)
+            ]
+            for band, levels in zip(self._bands, self._levels, strict=True)
         ]
 
     @property
     def levels(self) -> Sequence[tuple[int, int]]:
         """Cameras and the levels of detail at which they are sampled."""
         return [
-            (number, sampler.level + 1)
-            for band, samplers in zip(self._bands, self._samplers, strict=True)
-            for number, sampler in zip(band.cameras, samplers, strict=True)
+            (number, level + 1)
+            for band, levels in zip(self._bands, self._levels, strict=True)
+            for number, level in zip(band.cameras, levels, strict=True)
         ]
 
     def update(self, levels: Sequence[Mapping[int, Planes]], shares: Sequence[Share]) -> None:
@@ -62,10 +67,9 @@ class _Sampler:
     rise: NDArray[np.float32]
 
     @classmethod
-    def of(cls, part: Contribution, band: SeamBand) -> "_Sampler":
-        source = part.source[band.pixels]
-        level = median_level(source, np.ones(source.shape[:2], bool))
-        cells = source[:: band.cell_px, :: band.cell_px]
+    def of(cls, part: Contribution, band: SeamBand, level: int) -> "_Sampler":
+        """Return the sampler of a camera."""
+        cells = part.source[band.pixels][:: band.cell_px, :: band.cell_px]
         tones = np.clip(np.rint(part.light.tones), 0, 255).astype(np.uint8)[:, None]
         rise = np.repeat(part.light.rise(cells, part.frame_size)[..., None], 3, axis=-1)
         return cls(level, sampling_map(cells, level + 1), tones, rise)
@@ -79,6 +83,11 @@ class _Sampler:
         ]
         colours = cv2.LUT(cv2.transform(cv2.merge(sampled), FROM_PLANES), self.tones)
         return np.asarray(cv2.multiply(colours.astype(np.float32), self.rise), np.float32)
+
+
+def _level(part: Contribution, band: SeamBand) -> int:
+    source = part.source[band.pixels]
+    return median_level(source, np.ones(source.shape[:2], bool))
 
 
 def _static_share(panorama: Panorama, band: SeamBand) -> NDArray[np.float32]:

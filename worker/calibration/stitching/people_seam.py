@@ -36,8 +36,10 @@ MARGIN, CLEAR = 3, 8
 # where they hang together with more outright ones than noise makes.
 FAINT, OUTRIGHT, SPECK_CELLS = (3.0, 6.0), (6.0, 12.0), 2
 BESIDE = np.ones((3, 3), np.uint8)
+# Points of lines, and the pixels of the view that are theirs: a near line, and its blurred borders.
+LINE_STEP_M, BESIDE_LINE = 0.1, np.ones((15, 15), np.uint8)
 # Seconds in which what stays becomes a part of the ground: where nobody is, and where somebody stands.
-GROUND_S, STANDING_S = 1.0, 240.0
+GROUND_S, STANDING_S = 1.0, 30.0
 # More of a band than this does not differ because of people: a light went on, or a camera changed its exposure.
 CROWD = 0.6
 
@@ -47,8 +49,8 @@ class SeamBand:
     """Band of a view along the seam of two cameras, on a grid of cells, and its memory.
 
     `cameras`: their numbers; `cell_px`; `around`: rows and columns of cells in the view; `zone` (h, w): 1 in the band;
-    `second` (h, w): 1 where the second camera is the better one; `pitch` (h, w): 1 on the field. `rate`: of moments, a
-    second.
+    `second` (h, w): 1 where the second camera is the better one; `turf` (h, w): 1 on the field beside its lines.
+    `rate`: of moments, a second.
     """
 
     cameras: tuple[int, int]
@@ -56,7 +58,7 @@ class SeamBand:
     around: tuple[slice, slice]
     zone: Mask
     second: Mask
-    pitch: Mask
+    turf: Mask
     rate: float
     _ground: Values | None = field(default=None, init=False)
     _noise: Values = field(init=False)
@@ -102,14 +104,15 @@ class SeamBand:
         return self._blended(hulls, self._labels)
 
     def _begin(self, difference: Values) -> None:
-        """Take what stands beyond the field as ground; people on the field are there from the first moment on."""
-        on_pitch = (self.zone & self.pitch) > 0
-        usual = np.median(difference[on_pitch], axis=0) if on_pitch.any() else 0.0
-        self._ground = np.where(self.pitch[..., None] > 0, np.float32(usual), difference)
+        """Take lines and what stands beyond the field as ground; people may be on the field from the first on."""
+        on_turf = (self.zone & self.turf) > 0
+        usual = np.median(difference[on_turf], axis=0) if on_turf.any() else 0.0
+        self._ground = np.where(self.turf[..., None] > 0, np.float32(usual), difference)
         apart = self._apart(difference)
-        self._noise = np.full(self.zone.shape, np.median(apart[on_pitch]) if on_pitch.any() else 0.0, np.float32)
+        self._noise = np.full(self.zone.shape, np.median(apart[on_turf]) if on_turf.any() else 0.0, np.float32)
 
     def _apart(self, difference: Values) -> Values:
+        assert self._ground is not None
         return np.asarray(cv2.transform(cv2.absdiff(difference, self._ground), np.ones((1, 3))), np.float32)
 
     def _learn(self, difference: Values, apart: Values, taken: Mask) -> None:
@@ -157,17 +160,24 @@ class SeamBand:
         return around, np.asarray(second / np.maximum(people, np.float32(1e-6)), np.float32)
 
 
-def shows_pitch(pitch: Field, view: StitchedView) -> NDArray[np.bool_]:
-    """Return which pixels (H, W) of a view show the field."""
+def shows_turf(pitch: Field, view: StitchedView) -> NDArray[np.bool_]:
+    """Return which pixels (H, W) of a view show the field and no line of it.
+
+    Two cameras show a line a little apart from the first moment on, as they show what stands beyond the field.
+    """
     ground = np.abs(view.behind(pitch, every_nth_pixel(view.size))[..., :2])
     on_pitch = (ground < [pitch.length / 2, pitch.width / 2]).all(axis=-1)
-    return every_pixel(on_pitch, view.size) > 0.5
+    pixels = view.project(pitch.line_points(LINE_STEP_M).position)
+    columns, rows = np.rint(pixels[inside(pixels, view.size)]).astype(int).T
+    painted = np.zeros((view.size[1], view.size[0]), np.uint8)
+    painted[rows, columns] = 1
+    return (every_pixel(np.asarray(on_pitch), view.size) > 0.5) & (cv2.dilate(painted, BESIDE_LINE) == 0)
 
 
-def seam_bands(made: Panorama, pitch: NDArray[np.bool_], rate: float, border: float = FRAME_BORDER) -> list[SeamBand]:
+def seam_bands(made: Panorama, turf: NDArray[np.bool_], rate: float, border: float = FRAME_BORDER) -> list[SeamBand]:
     """Return the bands of the seams of a panorama.
 
-    `pitch` (H, W): where its pixels show the field; `rate`: of moments, a second; `border`: of each frame, in its
+    `turf` (H, W): `shows_turf`; `rate`: of moments, a second; `border`: of each frame, in its
     widths, that is not used.
     """
     cell = CELL_PX * max(1, round(made.size[0] / CELL_COLUMNS))
@@ -188,8 +198,10 @@ def seam_bands(made: Panorama, pitch: NDArray[np.bool_], rate: float, border: fl
         if zone.any():
             top_left, bottom_right = _with_border(zone)
             around = slice(top_left[0], bottom_right[0]), slice(top_left[1], bottom_right[1])
-            parts = [np.ascontiguousarray(mask[around], np.uint8) for mask in (zone, owner == j, pitch[cells])]
-            found.append(SeamBand((i, j), cell, around, *parts, rate))
+            in_band, second, bare = (
+                np.ascontiguousarray(mask[around], np.uint8) for mask in (zone, owner == j, turf[cells])
+            )
+            found.append(SeamBand((i, j), cell, around, in_band, second, bare, rate))
     return found
 
 
@@ -206,7 +218,7 @@ def opened(made: Panorama, bands: Sequence[SeamBand]) -> list[NDArray[np.float32
 def _seam(owner: NDArray[np.int8], pair: tuple[int, int]) -> Mask:
     """1 in cells (h, w) beside the seam of two cameras."""
     around = np.ones((3, 3), np.uint8)
-    first, second = (np.asarray(cv2.dilate((owner == number).astype(np.uint8), around)) for number in pair)
+    first, second = (np.asarray(cv2.dilate((owner == number).astype(np.uint8), around), np.uint8) for number in pair)
     return first & second
 
 

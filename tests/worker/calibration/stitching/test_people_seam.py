@@ -5,7 +5,7 @@ import pytest
 
 from tests.worker.video.filming import PITCH, cameras
 from worker.calibration.stitching.panorama import panorama
-from worker.calibration.stitching.people_seam import SeamBand, blend_shares, opened, seam_bands, shows_pitch
+from worker.calibration.stitching.people_seam import SeamBand, blend_shares, opened, seam_bands, shows_turf
 from worker.calibration.stitching.views import ViewChoice, chosen_view
 
 HEIGHT, WIDTH, SEAM = 60, 120, 60
@@ -14,12 +14,12 @@ RATE = 25.0
 LEAN, HALF = 5, 3
 
 
-def band(pitch=1):
+def band(turf=1):
     second = np.zeros((HEIGHT, WIDTH), np.uint8)
     second[:, SEAM:] = 1
     zone = np.ones((HEIGHT, WIDTH), np.uint8)
     zone[:, [0, -1]] = 0
-    return SeamBand((0, 1), 2, (slice(0, HEIGHT), slice(0, WIDTH)), zone, second, pitch * np.ones_like(zone), RATE)
+    return SeamBand((0, 1), 2, (slice(0, HEIGHT), slice(0, WIDTH)), zone, second, turf * np.ones_like(zone), RATE)
 
 
 def person(column, lean, top=20):
@@ -114,7 +114,7 @@ def test_the_seam_passes_between_two(noise):
 
 
 def test_what_stands_beyond_the_field_from_the_first_on_moves_no_seam(noise):
-    seam = band(pitch=0)
+    seam = band(turf=0)
     values, _ = both([SEAM], noise)
     assert is_static(seam, share(seam, values))
 
@@ -130,7 +130,7 @@ def test_a_light_that_goes_on_moves_no_seam(noise):
 def test_bands_lie_where_both_cameras_see():
     view = chosen_view(PITCH, cameras, ViewChoice(width=480))
     made = panorama(PITCH, view, cameras)
-    (found,) = seam_bands(made, shows_pitch(PITCH, view), RATE)
+    (found,) = seam_bands(made, shows_turf(PITCH, view), RATE)
     weights = opened(made, [found])
     zone = (weights[0] == 0.5) & (weights[1] == 0.5)
     assert zone.any(axis=1).mean() > 0.9
