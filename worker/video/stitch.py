@@ -23,7 +23,7 @@ from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.field import Field
 from worker.calibration.stitching.coverage import Unseen, unseen_part
 from worker.calibration.stitching.panorama import Panorama, panorama
-from worker.calibration.stitching.people_seam import FRAME_BORDER, seam_bands, shows_turf
+from worker.calibration.stitching.people_seam import MODEL, seam_bands, shows_turf
 from worker.calibration.stitching.photometric_alignment import evened_out
 from worker.calibration.stitching.photometry import Light
 from worker.calibration.stitching.views import StitchedView, ViewChoice, chosen_view
@@ -223,7 +223,7 @@ def stitch(
         sound = None if sound_clip is None else Sound(sound_clip, moments.begin_s - offsets[sound_clip.camera])
         with Writer(plan.output, view.size, rate, plan.encoding, sound) as writer:
             turf = shows_turf(scene.pitch, view) if plan.seam == "people" else None
-            renderers = RendererFactory(turf, float(rate), plan.threads, max(follow.border, FRAME_BORDER))
+            renderers = RendererFactory(turf, float(rate), plan.threads, max(follow.border, MODEL.frame_border))
             for made in _rendered(moments, geometry, view.size, writer, renderers):
                 if moments.count == 1:
                     begun(unseen_part(made.seen))

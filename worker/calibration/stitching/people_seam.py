@@ -24,24 +24,39 @@ from worker.calibration.stitching.views import StitchedView
 Mask = NDArray[np.uint8]
 Values = NDArray[np.float32]
 
-# A cell of the grid, in pixels of a view of so many columns.
-CELL_PX, CELL_COLUMNS = 2, 1920
-# How far from a seam people are looked for, in widths of the view: a near player with arms stretched.
-REACH = 0.2
-# What is so near to the border of a frame, in its widths, is half outside of it.
-FRAME_BORDER = 0.002
-# Cells over which one camera passes into the other beside people, and those beyond the seam from which on they change.
-MARGIN, CLEAR = 3, 8
-# Differences that are of people, in mean differences, and at least: the sum of three colours' levels. Faint ones count
-# where they hang together with more outright ones than noise makes.
-FAINT, OUTRIGHT, SPECK_CELLS = (3.0, 6.0), (6.0, 12.0), 2
-BESIDE = np.ones((3, 3), np.uint8)
-# Points of lines, and the pixels of the view that are theirs: a near line, and its blurred borders.
-LINE_STEP_M, BESIDE_LINE = 0.1, np.ones((15, 15), np.uint8)
-# Seconds in which what stays becomes a part of the ground: where nobody is, and where somebody stands.
-GROUND_S, STANDING_S = 1.0, 30.0
-# More of a band than this does not differ because of people: a light went on, or a camera changed its exposure.
-CROWD = 0.6
+
+@dataclass(frozen=True)
+class SeamModel:
+    """Differences of people from the ground beside a seam, and the ways of seams around them.
+
+    `cell_px`: cell of the grid, in pixels of a view of `cell_columns`. `reach`: distance from a seam, in widths of the
+    view, up to which people are looked for: a near player with arms stretched. `frame_border`: what is nearer to the
+    border of a frame, in its widths, is half outside of it. `margin`: cells over which one camera passes into the other
+    beside people; `clear`: cells beyond the seam from which on a person changes the camera. `faint`, `outright`:
+    differences that are of people, in mean differences, and at least, as the sum of three colours' levels; faint ones
+    count where they hang together with more outright ones than noise makes, `speck_cells`. `line_step_m`: distance of
+    points on lines, which take `line_px` of the view: a near line, and its blurred borders. `ground_s`, `standing_s`:
+    seconds in which what stays becomes a part of the ground, where nobody is, and where somebody stands. `crowd`: share
+    of a band above which it does not differ because of people: a light went on, or a camera changed its exposure.
+    """
+
+    cell_px: int = 2
+    cell_columns: int = 1920
+    reach: float = 0.2
+    frame_border: float = 0.002
+    margin: int = 3
+    clear: int = 8
+    faint: tuple[float, float] = (3.0, 6.0)
+    outright: tuple[float, float] = (6.0, 12.0)
+    speck_cells: int = 2
+    line_step_m: float = 0.1
+    line_px: int = 15
+    ground_s: float = 1.0
+    standing_s: float = 30.0
+    crowd: float = 0.6
+
+
+MODEL = SeamModel()
 
 
 @dataclass
@@ -70,8 +85,8 @@ class SeamBand:
     def __post_init__(self) -> None:
         """Compute distances to the seam, and the edge of the band."""
         self._hulls, self._labels = np.zeros_like(self.zone), self.second.copy()
-        self._edge = self.zone & np.asarray(cv2.dilate(1 - self.zone, np.ones((3, 3), np.uint8)))
-        seam = np.asarray(cv2.morphologyEx(self.second, cv2.MORPH_GRADIENT, np.ones((3, 3), np.uint8)))
+        self._edge = self.zone & np.asarray(cv2.dilate(1 - self.zone, _square(3)))
+        seam = np.asarray(cv2.morphologyEx(self.second, cv2.MORPH_GRADIENT, _square(3)))
         self._clearance = np.asarray(cv2.distanceTransform(1 - seam, cv2.DIST_L2, 3), np.float32)
 
     @property
@@ -92,9 +107,9 @@ class SeamBand:
         apart = self._apart(difference)
         faint, outright = (
             ((apart > np.maximum(means * self._noise, levels)) & (self.zone > 0)).astype(np.uint8)
-            for means, levels in (FAINT, OUTRIGHT)
+            for means, levels in (MODEL.faint, MODEL.outright)
         )
-        if np.count_nonzero(faint) > CROWD * np.count_nonzero(self.zone):
+        if np.count_nonzero(faint) > MODEL.crowd * np.count_nonzero(self.zone):
             self._ground, faint = difference, np.zeros_like(faint)
         # Who was seen outright a moment ago is still there.
         people = _people(faint, outright | (faint & self._hulls)) & self.zone
@@ -117,7 +132,9 @@ class SeamBand:
 
     def _learn(self, difference: Values, apart: Values, taken: Mask) -> None:
         """Follow the ground, hardly where it is taken."""
-        share = np.where(taken > 0, np.float32(1 / STANDING_S), np.float32(1 / GROUND_S)) / np.float32(self.rate)
+        share = np.where(taken > 0, np.float32(1 / MODEL.standing_s), np.float32(1 / MODEL.ground_s)) / np.float32(
+            self.rate
+        )
         assert self._ground is not None
         self._ground += share[..., None] * (difference - self._ground)
         self._noise += np.where(taken > 0, np.float32(0), share) * (apart - self._noise)
@@ -147,14 +164,14 @@ class SeamBand:
             # What reaches beyond the band is shown there by the better camera.
             return int(edges[0])
         better = second[own].mean()
-        if better in (0, 1) and self._clearance[here][own].min() > CLEAR:
+        if better in (0, 1) and self._clearance[here][own].min() > MODEL.clear:
             return int(better)
         before = own & (self._hulls[here] > 0)
         remembers = np.count_nonzero(before) > np.count_nonzero(own) / 8
         return int((self._labels[here][before].mean() if remembers else better) > 0.5)
 
     def _blended(self, hulls: Mask, labels: Mask) -> tuple[Values, Values]:
-        size = 2 * (2 * MARGIN + 1,)
+        size = 2 * (2 * MODEL.margin + 1,)
         people, second = (cv2.blur(mask.astype(np.float32), size) for mask in (hulls, hulls & labels))
         around = np.minimum(np.asarray(people) * 4, 1).astype(np.float32) * self.zone
         return around, np.asarray(second / np.maximum(people, np.float32(1e-6)), np.float32)
@@ -167,23 +184,25 @@ def shows_turf(pitch: Field, view: StitchedView) -> NDArray[np.bool_]:
     """
     ground = np.abs(view.behind(pitch, every_nth_pixel(view.size))[..., :2])
     on_pitch = (ground < [pitch.length / 2, pitch.width / 2]).all(axis=-1)
-    pixels = view.project(pitch.line_points(LINE_STEP_M).position)
+    pixels = view.project(pitch.line_points(MODEL.line_step_m).position)
     columns, rows = np.rint(pixels[inside(pixels, view.size)]).astype(int).T
     painted = np.zeros((view.size[1], view.size[0]), np.uint8)
     painted[rows, columns] = 1
-    return (every_pixel(np.asarray(on_pitch), view.size) > 0.5) & (cv2.dilate(painted, BESIDE_LINE) == 0)
+    return (every_pixel(np.asarray(on_pitch), view.size) > 0.5) & (cv2.dilate(painted, _square(MODEL.line_px)) == 0)
 
 
-def seam_bands(made: Panorama, turf: NDArray[np.bool_], rate: float, border: float = FRAME_BORDER) -> list[SeamBand]:
+def seam_bands(
+    made: Panorama, turf: NDArray[np.bool_], rate: float, border: float = MODEL.frame_border
+) -> list[SeamBand]:
     """Return the bands of the seams of a panorama.
 
     `turf` (H, W): `shows_turf`; `rate`: of moments, a second; `border`: of each frame, in its
     widths, that is not used.
     """
-    cell = CELL_PX * max(1, round(made.size[0] / CELL_COLUMNS))
+    cell = MODEL.cell_px * max(1, round(made.size[0] / MODEL.cell_columns))
     rows, columns = (extent // cell for extent in reversed(made.size))
     cells = slice(0, cell * rows, cell), slice(0, cell * columns, cell)
-    owner, reach = made.owner[cells], REACH * made.size[0] / cell
+    owner, reach = made.owner[cells], MODEL.reach * made.size[0] / cell
     seen = [
         inside(part.source[cells], part.frame_size, border * part.frame_size[0]) | (part.weight[cells] > 0.99)
         for part in made.parts
@@ -217,7 +236,7 @@ def opened(made: Panorama, bands: Sequence[SeamBand]) -> list[NDArray[np.float32
 
 def _seam(owner: NDArray[np.int8], pair: tuple[int, int]) -> Mask:
     """1 in cells (h, w) beside the seam of two cameras."""
-    around = np.ones((3, 3), np.uint8)
+    around = _square(3)
     first, second = (np.asarray(cv2.dilate((owner == number).astype(np.uint8), around), np.uint8) for number in pair)
     return first & second
 
@@ -234,9 +253,10 @@ def _with_border(zone: NDArray[np.bool_]) -> tuple[tuple[int, int], tuple[int, i
 
 def _people(faint: Mask, outright: Mask) -> Mask:
     """Return what differs and its blurred border (h, w), without specks."""
-    grown = cv2.morphologyEx(cv2.dilate(faint, BESIDE), cv2.MORPH_CLOSE, BESIDE)
+    beside = _square(3)
+    grown = cv2.morphologyEx(cv2.dilate(faint, beside), cv2.MORPH_CLOSE, beside)
     _, numbers = cv2.connectedComponents(grown, connectivity=4)
-    people = np.bincount(numbers[outright > 0], minlength=int(numbers.max()) + 1) > SPECK_CELLS
+    people = np.bincount(numbers[outright > 0], minlength=int(numbers.max()) + 1) > MODEL.speck_cells
     people[0] = False
     return people[numbers].astype(np.uint8)
 
@@ -264,3 +284,8 @@ def blend_shares(people: Values, second: Values, static: NDArray[np.float32]) ->
     size = static.shape[1], static.shape[0]
     fine, labels = (cv2.resize(part, size, interpolation=cv2.INTER_LINEAR) for part in (people, second))
     return np.asarray(cv2.blendLinear(labels, static, fine, 1 - fine), np.float32)
+
+
+def _square(side: int) -> Mask:
+    """Return a square of ones (`side`, `side`)."""
+    return np.ones((side, side), np.uint8)
