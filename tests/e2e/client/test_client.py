@@ -110,7 +110,7 @@ def test_the_same_without_blocking(service, frames, name):
 def test_both_clients_have_the_same_methods_with_the_same_signatures():
     clients = Client("http://127.0.0.1:9"), AsyncClient("http://127.0.0.1:9")
     names = [name for name in dir(Client) if not name.startswith("_") and name != "url_of"]
-    assert len(names) == 37
+    assert len(names) == 40
     for name in names:
         blocking, awaited = (getattr(client, name) for client in clients)
         assert inspect.signature(blocking) == inspect.signature(awaited)
