@@ -44,6 +44,7 @@ OTHERWISE = {
     ("GET", "/ui/new-venue"): "admin",
     ("GET", "/ui/new-venue/by-hand"): "admin",
     ("POST", "/ui/new-venue/plan"): "read",
+    ("POST", "/ui/new-venue/calibration"): "admin",
     ("PUT", "/venues/{venue_id}/live"): "calibrate",
     ("GET", "/keys"): "admin",
     ("POST", "/keys"): "admin",

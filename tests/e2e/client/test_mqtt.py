@@ -177,7 +177,7 @@ def test_the_button_calibrates_by_the_sources_of_a_venue(service, name, bridge, 
     button = wait_for(lambda: watcher.document(config_topic(name)))["components"]["calibrate"]
     watcher.publish(button["command_topic"], "something else")
     watcher.publish(button["command_topic"], button["payload_press"])
-    wait_for(lambda: watcher.document(f"{name}/{name}/state")["accepted_at"])
+    wait_for(lambda: (said := watcher.document(f"{name}/{name}/state")) and said["accepted_at"])
     assert [job["status"] for job in service.http.get("/jobs", params={"venue": name}).json()["jobs"]] == ["succeeded"]
 
 

@@ -27,4 +27,4 @@ def test_lenses_alone_are_no_venue(tmp_path, capsys):
     with pytest.raises(SystemExit) as ended:
         venue_of(tmp_path / "camera_info.yaml", parse_field("football", None), "main")
     assert ended.value.code == 2
-    assert "expected a pose, got none; esc venue find needs none" in capsys.readouterr().err
+    assert "expected a pose, got none. A search (`esc venue find`) needs none." in capsys.readouterr().err
