@@ -40,10 +40,10 @@ def list_keys(by: Administrator, context: InContext) -> ApiKeys:  # noqa: ARG001
 def add_key(wanted: KeyIn, by: Administrator, context: InContext) -> MadeKey:
     """Make a key and return it, this once: what is stored is its hash."""
     try:
-        key = context.keys.add(wanted.name, wanted.scope, wanted.expires_at, wanted.venues)
+        key = context.keys.add(wanted.name, wanted.scope, wanted.expires_at, wanted.venue_ids)
     except KeyExists:
         raise Problem("key-exists", f"Revoke {wanted.name} first, or take another name.") from None
-    log.info("key made", name=wanted.name, scope=wanted.scope, venues=wanted.venues, by=by.name)
+    log.info("key made", name=wanted.name, scope=wanted.scope, venues=wanted.venue_ids, by=by.name)
     return MadeKey(name=wanted.name, key=key)
 
 
@@ -73,5 +73,5 @@ def _shown(key: Key) -> ApiKey:
         created_at=key.created_at,
         expires_at=key.expires_at,
         last_used_at=key.last_used_at,
-        venues=None if key.venues is None else sorted(key.venues),
+        venue_ids=None if key.venues is None else sorted(key.venues),
     )

@@ -6,10 +6,11 @@ stored rows) are read by the same models with `TOLERANTLY`.
 
 import re
 from dataclasses import dataclass
-from datetime import date
+from datetime import date, datetime
 from typing import Annotated, Any
 
 from pydantic import (
+    AwareDatetime,
     BaseModel,
     BeforeValidator,
     ConfigDict,
@@ -42,6 +43,18 @@ def _as_written(day: Any) -> Any:
 
 # Pydantic alone would also take a number of seconds for a day.
 Day = Annotated[date, BeforeValidator(_as_written)]
+
+
+def _as_moment(moment: Any) -> Any:
+    if isinstance(moment, str) and not re.match(r"\d{4}-\d{2}-\d{2}[Tt ]", moment, re.ASCII):
+        raise ValueError("expected a moment such as 2026-11-23T10:00:09Z")
+    if not isinstance(moment, str | datetime):
+        raise ValueError("expected a text such as 2026-11-23T10:00:09Z")
+    return moment
+
+
+# Pydantic alone would also take a number of seconds for a moment.
+Timestamp = Annotated[AwareDatetime, BeforeValidator(_as_moment)]
 
 
 class _WrittenByAnotherVersion:

@@ -3,9 +3,9 @@
 from datetime import datetime
 from typing import Annotated
 
-from pydantic import AwareDatetime, Field
+from pydantic import Field
 
-from service.schemas.base import OPEN_WORD, Id, Schema
+from service.schemas.base import OPEN_WORD, Id, Schema, Timestamp
 from service.schemas.names import Scope
 
 
@@ -14,8 +14,8 @@ class KeyIn(Schema):
 
     name: Id = Field(description="Name of the key: of the machine or person that will use it.")
     scope: Scope = Field(description="`read`; `calibrate`, which includes it; `admin`, which includes both.")
-    expires_at: AwareDatetime | None = Field(None, description="Time of its expiry; null: never.")
-    venues: Annotated[list[Id], Field(min_length=1)] | None = Field(
+    expires_at: Timestamp | None = Field(None, description="Time of its expiry; null: never.")
+    venue_ids: Annotated[list[Id], Field(min_length=1)] | None = Field(
         None, description="Ids of the venues that it is for; null: all."
     )
 
@@ -28,7 +28,7 @@ class ApiKey(Schema):
     created_at: datetime = Field(description="Time at which it was made.")
     expires_at: datetime | None = Field(description="Time of its expiry; null: never.")
     last_used_at: datetime | None = Field(description="Time of its last use, to the minute; null: never used.")
-    venues: list[str] | None = Field(description="Ids of the venues that it is for; null: all.")
+    venue_ids: list[str] | None = Field(description="Ids of the venues that it is for; null: all.")
 
 
 class MadeKey(Schema):

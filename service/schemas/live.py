@@ -1,38 +1,23 @@
 """Models of live poses: the reports of `esc live`, the newest state, and the history by minute."""
 
-import re
 from datetime import datetime
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
     AfterValidator,
-    AwareDatetime,
-    BeforeValidator,
     ConfigDict,
     Field,
     StringConstraints,
     model_validator,
 )
 
-from service.schemas.base import OPEN_WORD, Flag, Id, Integer, Name, Number, Schema
+from service.schemas.base import OPEN_WORD, Flag, Id, Integer, Name, Number, Schema, Timestamp
 from service.schemas.geometry import Pose, PoseIn
 from service.schemas.source_urls import hide_secrets
 
 LONGEST_HISTORY_MIN = 7 * 24 * 60
 LiveStatus = Literal["stored", "measured", "coasted", "refused", "silent"]
 LiveClock = Literal["rtcp", "arrival"]
-
-
-def _as_written(moment: Any) -> Any:
-    if isinstance(moment, str) and not re.match(r"\d{4}-\d{2}-\d{2}[Tt ]", moment, re.ASCII):
-        raise ValueError("expected a moment such as 2026-11-23T10:00:09Z")
-    if not isinstance(moment, str | datetime):
-        raise ValueError("expected a text such as 2026-11-23T10:00:09Z")
-    return moment
-
-
-# Pydantic alone would also take a number of seconds for a moment.
-Timestamp = Annotated[AwareDatetime, BeforeValidator(_as_written)]
 Count = Annotated[Integer, Field(ge=0, le=10**9)]
 Milliseconds = Annotated[Number, Field(ge=0, le=1e9)]
 StreamAddress = Annotated[Name, StringConstraints(min_length=1, max_length=1024), AfterValidator(hide_secrets)]

@@ -32,7 +32,7 @@ def kind(answer):
 
 def test_an_administrator_makes_a_key_that_works_and_revokes_it(guarded, admin):
     until = datetime.now(UTC).replace(microsecond=0) + timedelta(days=1)
-    wanted = {"name": "truck-7", "scope": "calibrate", "venues": ["one", "one"], "expires_at": until.isoformat()}
+    wanted = {"name": "truck-7", "scope": "calibrate", "venue_ids": ["one", "one"], "expires_at": until.isoformat()}
     made = guarded.http.post("/keys", json=wanted, headers=admin)
     assert made.status_code == 201
     assert made.json()["name"] == "truck-7"
@@ -43,8 +43,8 @@ def test_an_administrator_makes_a_key_that_works_and_revokes_it(guarded, admin):
     listed = guarded.http.get("/keys", headers=admin)
     assert made.json()["key"] not in listed.text
     ops, truck = listed.json()["keys"]
-    assert (ops["name"], ops["venues"], ops["expires_at"]) == ("ops", None, None)
-    assert (truck["scope"], truck["venues"]) == ("calibrate", ["one"])
+    assert (ops["name"], ops["venue_ids"], ops["expires_at"]) == ("ops", None, None)
+    assert (truck["scope"], truck["venue_ids"]) == ("calibrate", ["one"])
     assert datetime.fromisoformat(truck["expires_at"]) == until
 
     assert kind(guarded.http.post("/keys", json=wanted, headers=admin)) == "key-exists"
@@ -81,7 +81,8 @@ def test_a_key_does_not_revoke_itself(guarded, admin):
     [
         {"name": "Bad name", "scope": "read"},
         {"name": "one", "scope": "everything"},
-        {"name": "one", "scope": "read", "venues": []},
+        {"name": "one", "scope": "read", "venue_ids": []},
+        {"name": "one", "scope": "read", "expires_at": 0},
         {"name": "one", "scope": "read", "expires_at": "2030-01-01T00:00:00"},
     ],
 )

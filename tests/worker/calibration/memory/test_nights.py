@@ -30,9 +30,9 @@ def test_a_lens_that_is_right_is_accepted_every_night_and_nothing_is_said_of_it(
 
 @pytest.mark.parametrize("step", try_first([0.003, 0.001, -0.01]))
 def test_a_zoom_between_two_nights_is_told_at_once_and_by_how_much(step):
-    done = nights_of(lambda night: step * (night >= 3), 5)
+    done = nights_of(lambda night: step * (night >= 4), 6)
     assert not any(wrong(*one) for one in done)
-    changed = [result.lens_change for result, _ in done[3:]]
+    changed = [result.lens_change for result, _ in done[4:]]
     assert all(change.notable for change in changed)
     for change in changed:
         assert change.longer == pytest.approx(step, abs=max(0.0003, 0.06 * abs(step)))
