@@ -100,6 +100,7 @@ def overall(scores: dict[Task, TaskScore]) -> float:
 def _judge(case: Case, cases: CaseSet, name: str, answer: Answer) -> tuple[list[Verdict], list[float]]:
     truth = cases.truth(name)
     pitch = pitch_of(truth.field)
+    markings = FieldMap.of(pitch)
     verdicts, stitch = [], []
     for moment, true in enumerate(truth.moments):
         said = {one.id: one for one in answer.moments[moment].cameras} if moment < len(answer.moments) else {}
@@ -109,16 +110,17 @@ def _judge(case: Case, cases: CaseSet, name: str, answer: Answer) -> tuple[list[
             camera = None if one is None else one.posed(known, real.camera.image_size)
             accepted = camera is not None and one is not None and one.accepted
             sigma_m = None if one is None or one.sigma is None else one.sigma.position_m
-            verdicts.append(_verdict(pitch, real, camera, accepted, sigma_m))
+            verdicts.append(_verdict(pitch, markings, real, camera, accepted, sigma_m))
             found.append(camera if accepted else None)
         stitch += list(_stitch_cm(pitch, [one.posed for one in true], found))
     return verdicts, stitch
 
 
-def _verdict(pitch: Field, real: TrueCamera, camera: Camera | None, accepted: bool, sigma_m: float | None) -> Verdict:
+def _verdict(
+    pitch: Field, markings: FieldMap, real: TrueCamera, camera: Camera | None, accepted: bool, sigma_m: float | None
+) -> Verdict:
     if camera is None:
         return Verdict(real.shows_field, False, False, np.inf, None)
-    markings = FieldMap.of(pitch)
     shift_px = mean_shift_px(pitch, markings, real.posed, camera, UNSEEN_PX)
     # Half a turn about the middle leaves most fields as they are: nothing in the frame says which side it is.
     same = [camera, twin(camera)] if markings.is_symmetric else [camera]

@@ -74,7 +74,7 @@ def discovery_of(venue: Venue, topics: Topics, page: str) -> str:
     }
     button = {"platform": "button", "name": "Calibrate", "payload_press": PRESS}
     named = {name: part | {"unique_id": f"{uid}_{name}"} for name, part in components.items()}
-    if all(camera.source for camera in venue.cameras):
+    if venue.has_sources:
         topic = {"command_topic": topics.calibrate(venue.id), "unique_id": f"{uid}_calibrate"}
         named["calibrate"] = button | topic
     else:

@@ -44,7 +44,7 @@ class Tools:
                 "id": venue.id,
                 "name": venue.name,
                 "cameras": [camera.id for camera in venue.cameras],
-                "has_sources": all(camera.source for camera in venue.cameras),
+                "has_sources": venue.has_sources,
             }
             for venue in await self._client.venues()
         ]

@@ -243,6 +243,11 @@ class Venue(VenueSettings):
     cameras: list[Camera] = Field(description="Cameras around the field, with their current poses.")
 
     @property
+    def has_sources(self) -> bool:
+        """True if the service can fetch a frame of every camera by itself."""
+        return all(camera.source for camera in self.cameras)
+
+    @property
     def poses(self) -> dict[str, Pose]:
         """Poses by camera."""
         return {camera.id: camera.pose for camera in self.cameras}

@@ -68,7 +68,7 @@ log = logging.getLogger(__name__)
 FIELD_OF_VIEW_UNCERTAIN = 0.15
 """One standard deviation of the focal length that a given field of view leaves, as a part of it."""
 PANORAMA_UNCERTAIN = 0.05
-"""The same of a panorama, whose data sheet gives its angle to the nearest ten degrees: what is stitched is cropped."""
+"""Relative sigma of a panorama's focal length: data sheets give its angle to ten degrees, and stitching crops it."""
 
 
 def solve(

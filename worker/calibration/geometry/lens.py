@@ -50,7 +50,7 @@ class Lens(ABC):
     terms: ClassVar[int]
     """Number of coefficients of the model."""
     parameters: ClassVar[tuple[str, ...]] = LENS_PARAMETERS
-    """Those of `LENS_PARAMETERS` that the model has and lines can tell from the pose."""
+    """Parameters among `LENS_PARAMETERS` that the model has and lines can tell from the pose."""
 
     def project(self, points: Array) -> Array:
         """Project points (..., 3) in the camera's frame to pixels (..., 2); NaN where the model has no pixel."""
