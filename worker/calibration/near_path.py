@@ -38,13 +38,25 @@ class NearSolution:
         return {n: result.camera for n, result in zip(self.numbers, self.results, strict=True)}
 
 
-def refine_by_lines(problem: Problem, progress: ProgressReporter) -> NearSolution | None:
-    """Refine the cameras that stand almost at their stored poses by their lines alone; None if none do."""
+@dataclass(frozen=True)
+class NearAttempt:
+    """Attempt at refining the cameras that show their lines near their stored poses.
+
+    `tried` holds the results of all of them, refined together; `solution` those that passed, None if none did.
+    """
+
+    tried: list[CameraResult]
+    solution: NearSolution | None
+
+
+def refine_by_lines(problem: Problem, progress: ProgressReporter) -> NearAttempt:
+    """Refine the cameras that stand almost at their stored poses by their lines alone."""
     progress = progress.muted()
     usable = problem.usable
     reader = problem.observed.observations.of(usable).reader()
     showing = shows_most_lines(problem.pitch, [problem.cameras[n] for n in usable], reader)
     numbers = [n for n, shows in zip(usable, showing, strict=True) if shows]
+    tried: list[CameraResult] = []
     while numbers:
         group = problem.of(numbers)
         with progress.timed("refinement"):
@@ -59,16 +71,17 @@ def refine_by_lines(problem: Problem, progress: ProgressReporter) -> NearSolutio
                 reader=reader.of([usable.index(n) for n in numbers]),
             )
         results = judge_each(group, refined, progress)
+        tried = tried or results
         near = [
             n
             for n, result in zip(numbers, results, strict=True)
             if _is_near(problem, result) and is_confirmed(problem, n, result)
         ]
         if near == numbers:
-            return NearSolution(numbers, refined, results)
+            return NearAttempt(tried, NearSolution(numbers, refined, results))
         # The cameras that were not near may have pulled at the others, which are refined once more without them.
         numbers = near
-    return None
+    return NearAttempt(tried, None)
 
 
 def _is_near(problem: Problem, result: CameraResult) -> bool:

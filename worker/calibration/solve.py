@@ -8,11 +8,11 @@ The cheapest explanation comes first, and the first one that the gate accepts fo
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from worker.calibration.diagnostics.overlap import Overlap, overlap_of
+from worker.calibration.diagnostics.overlap import Overlap
 from worker.calibration.gate.quality import GATE, MUCH_UNEXPECTED
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.joint_verdict import judge_together
-from worker.calibration.near_path import NearSolution, refine_by_lines
+from worker.calibration.near_path import NearAttempt, NearSolution, refine_by_lines
 from worker.calibration.observe import FrameObserver
 from worker.calibration.paint_path import (
     around_stored_poses,
@@ -22,7 +22,7 @@ from worker.calibration.paint_path import (
 )
 from worker.calibration.problem import PoseSolution, Problem, Solution
 from worker.calibration.records import EngineResult, Path, ProgressReporter
-from worker.calibration.steps import evidence_at, refine_without, shows_most_lines, with_unusable_cameras
+from worker.calibration.steps import evidence_at, refine_without, with_unusable_cameras
 from worker.calibration.swapped_cameras import mark_swapped_frames
 from worker.calibration.wide_path import NO_CAMERAS, search_and_refine, search_in_overviews
 from worker.calibration.zoom_refit import refit_zoomed
@@ -35,13 +35,14 @@ def solve(problem: Problem, observer: FrameObserver, progress: ProgressReporter)
     a camera that was turned is alone: only then is a paint looked for.
     """
     problem = observer.with_overviews(problem, progress)
-    near = _refine_near(problem, progress)
+    attempt = _refine_near(problem, progress)
+    near = attempt.solution
     solution = _solve_near(problem, near, progress)
     if solution is not None:
         return solution, observer
 
     # Where the cameras stood, in one paint.
-    if problem.options.search == "auto" and _stand_among_other_lines(problem):
+    if _stand_among_other_lines(problem, attempt):
         painted = show_paint_of_field(problem, observer, at_stored_poses, progress.muted())
         solution = None if painted is None else _solve_near_in(painted, problem, progress)
         if painted is not None and solution is not None:
@@ -63,13 +64,13 @@ def solve(problem: Problem, observer: FrameObserver, progress: ProgressReporter)
 def solve_in_all_colours(problem: Problem, observer: FrameObserver, progress: ProgressReporter) -> Solution:
     """Solve for the poses of all cameras by all that their frames show."""
     problem = observer.with_overviews(problem, progress)
-    near = _refine_near(problem, progress)
+    near = _refine_near(problem, progress).solution
     return _solve_near(problem, near, progress) or _solve_farther(problem, near, observer, progress)
 
 
-def _refine_near(problem: Problem, progress: ProgressReporter) -> NearSolution | None:
-    """Refine the cameras that stand almost where they stood; None if none do, or a search was asked for."""
-    return refine_by_lines(problem, progress) if problem.options.search == "auto" else None
+def _refine_near(problem: Problem, progress: ProgressReporter) -> NearAttempt:
+    """Refine the cameras that stand almost where they stood; none of them if a search was asked for."""
+    return refine_by_lines(problem, progress) if problem.options.search == "auto" else NearAttempt([], None)
 
 
 def _solve_farther(
@@ -93,14 +94,13 @@ def _solve_farther(
     return _solve_around(problem, observer, lost, NO_CAMERAS if near is None else near.cameras, progress)
 
 
-def _stand_among_other_lines(problem: Problem) -> bool:
-    """True if the stored poses of all usable cameras see the field's lines, and mostly others beside them."""
-    group = problem.of(problem.usable)
-    seen = [group.observed.seen_by_network(n) for n in range(len(group.cameras))]
-    cameras = [camera.resized(of.shape[1]) for camera, of in zip(group.cameras, seen, strict=True)]
-    overlaps = [overlap_of(group.pitch, camera, of) for camera, of in zip(cameras, seen, strict=True)]
-    reader = group.observed.observations.reader()
-    return _are_mostly_others(overlaps) and all(shows_most_lines(group.pitch, group.cameras, reader))
+def _stand_among_other_lines(problem: Problem, near: NearAttempt) -> bool:
+    """True if all usable cameras see the field's lines from near their stored poses, and mostly others beside them.
+
+    Asked where the lines lie best: from a camera that turned by half a degree the field's own lines look like others.
+    """
+    sees_all = len(near.tried) == len(problem.usable)
+    return sees_all and _are_mostly_others([one.overlap for one in near.tried])
 
 
 def _are_mostly_others(overlaps: Sequence[Overlap]) -> bool:
@@ -114,7 +114,7 @@ def _solve_near_in(painted: FrameObserver, problem: Problem, progress: ProgressR
     Less is seen of the field's lines in one paint: in all colours the stored poses may not fit better.
     """
     seen = painted.with_overviews(painted.seen_in(problem), progress)
-    solution = _solve_near(seen, _refine_near(seen, progress), progress)
+    solution = _solve_near(seen, _refine_near(seen, progress).solution, progress)
     if solution is None:
         return None
     for n in problem.usable:
