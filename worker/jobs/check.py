@@ -22,6 +22,7 @@ from worker.jobs.from_schemas import JobFailedError, lens_of, pitch_of
 from worker.jobs.to_schemas import (
     Solution,
     engine_failures,
+    field_to_schema,
     lens_to_schema,
     load_segmenter,
     pose_to_schema,
@@ -48,11 +49,17 @@ def solve(
         checked = check_cameras(
             pitch, cameras, frames, segmenter, given.seed or 0, lambda step: report(progress_to_schema(step))
         )
-    graded = [_to_schema(grade(pitch, one, _folds(one.meant.intrinsics))) for one in checked]
+    graded = [_to_schema(grade(one, _folds(one.meant.intrinsics))) for one in checked]
+    fitted = next((one.pitch for one in checked if one.pitch is not pitch), None)
+    if fitted is not None:
+        warnings.append(
+            f"The calibration fits the lines on a field of {fitted.length:.2f} x {fitted.width:.2f} m with a ridge "
+            f"{fitted.ridge_height:.2f} m high, and not on the given one. Measure the field, or give it with --site"
+        )
     result = CheckResult(
         grade=next(worst for worst in GRADES if any(one.grade == worst for one in graded)),
         format=given.format,
-        field=given.field,
+        field=given.field if fitted is None else field_to_schema(given.field, fitted),
         cameras=graded,
         warnings=warnings,
         timings_s=round_to_ms({"check": time.perf_counter() - begun}),

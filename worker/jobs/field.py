@@ -13,7 +13,7 @@ from worker.compute_resources import ComputeResources
 from worker.jobs.documents import Progress
 from worker.jobs.frames_job import FramesJob
 from worker.jobs.from_schemas import encode_jpeg
-from worker.jobs.to_schemas import MILLIMETRE, Solution, camera_to_schema, finite_or_none, ridge_to_schema, round_to_ms
+from worker.jobs.to_schemas import Solution, camera_to_schema, field_to_schema, finite_or_none, round_to_ms
 
 log = logging.getLogger(__name__)
 
@@ -51,7 +51,7 @@ def _result(job: FramesJob, given: FieldOfPlay, found: FieldFit) -> FieldResult:
     return FieldResult(
         accepted=found.accepted,
         rejected_because=found.rejected_because,
-        field=_field_to_schema(given, found) if found.accepted else given,
+        field=field_to_schema(given, found.pitch) if found.accepted else given,
         measures=[_measure_to_schema(measure) for measure in found.measures],
         cameras=[camera_to_schema(camera) for camera in found.cameras],
         stitch_error_px=finite_or_none(found.stitch_error_px),
@@ -60,13 +60,6 @@ def _result(job: FramesJob, given: FieldOfPlay, found: FieldFit) -> FieldResult:
         cpu_s=round_to_ms(job.spent.core_seconds),
         provenance=job.provenance,
     )
-
-
-def _field_to_schema(given: FieldOfPlay, found: FieldFit) -> FieldOfPlay:
-    """Return the fitted pitch in millimetres, which are finer than any of its sigmas."""
-    pitch = found.pitch
-    size = {"length_m": round(pitch.length, MILLIMETRE), "width_m": round(pitch.width, MILLIMETRE)}
-    return given.changed({**size, "ridge": ridge_to_schema(pitch)})
 
 
 def _measure_to_schema(measure: Measure) -> MeasureResult:

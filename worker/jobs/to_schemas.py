@@ -42,6 +42,7 @@ from worker.jobs.documents import (
 from worker.jobs.from_schemas import JobFailedError, camera_of
 
 if TYPE_CHECKING:
+    from service.schemas.field import FieldOfPlay
     from service.schemas.trend import Anchor
 
 PROVIDERS = {"cpu": "CPUExecutionProvider", "cuda": "CUDAExecutionProvider", "openvino": "OpenVINOExecutionProvider"}
@@ -108,6 +109,12 @@ def pose_to_schema(pose: Pose) -> documents.Pose:
 def ridge_to_schema(pitch: Field) -> list[list[float]] | None:
     """Return the two ends of a pitch's ridge (m, to the millimetre), or None for a flat one."""
     return None if pitch.ridge is None else pitch.ridge.round(MILLIMETRE).tolist()
+
+
+def field_to_schema(given: "FieldOfPlay", pitch: Field) -> "FieldOfPlay":
+    """Return a field of the wire with the measures of a fitted pitch in millimetres, finer than any of its sigmas."""
+    size = {"length_m": round(pitch.length, MILLIMETRE), "width_m": round(pitch.width, MILLIMETRE)}
+    return given.changed({**size, "ridge": ridge_to_schema(pitch)})
 
 
 def finite_or_none(value: Any) -> float | None:

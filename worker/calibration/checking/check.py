@@ -1,12 +1,13 @@
 """The engine's third page: cameras as a file of any origin has them, and frames, in; how good each is, and why, out.
 
-First the file is taken at its word: the cameras are calibrated from where it puts them, as a job does. For those that
-are not found there, in this order, the first that the gate accepts: the poses in another convention and the lens at
-another resolution, the camera turned where it stands, zoomed where it stands, anywhere, or with another lens.
+First the file is taken at its word: the cameras are calibrated from where it puts them, as a job does. Those that are
+found elsewhere may stand there on another field: one that is crowned, or of other measures, if the lines say so. For
+those that are not found, in this order, the first that the gate accepts: the poses in another convention and the lens
+at another resolution, the camera turned where it stands, zoomed where it stands, anywhere, or with another lens.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -17,6 +18,7 @@ from worker.calibration.checking.ranking import films_the_field, rank_readings
 from worker.calibration.checking.readings import Reading
 from worker.calibration.detection.evidence import TOLERANCE_PX
 from worker.calibration.detection.segmentation import whole_frame
+from worker.calibration.field_fit.measures import fit_field
 from worker.calibration.find_cameras import find_cameras
 from worker.calibration.gate.quality import CameraResult, Moved
 from worker.calibration.geometry.camera import Camera, Frame
@@ -53,14 +55,15 @@ for the field."""
 class CheckedCamera:
     """Camera of a file beside the camera that its frame shows.
 
-    `given`: as the file has it, its lens for the frame's size; `reading`: the convention in which it fits; `meant`: the
-    camera of that reading; `found`: as it was calibrated, None if it was not; `refusal`: why it was not; `is_resized`:
-    True if the lens was for pictures of another resolution, `is_reordered` if its coefficients were in another order
-    than OpenCV's; `searched`: the search that found it, None if it stands
-    where the file puts it; `explained`: share of the paint in the frame, 0..1, on the markings as the file puts them,
-    None where little paint is seen.
+    `pitch`: the field on which it was calibrated; `given`: as the file has it, its lens for the frame's size;
+    `reading`: the convention in which it fits; `meant`: the camera of that reading; `found`: as it was calibrated, None
+    if it was not; `refusal`: why it was not; `is_resized`: True if the lens was for pictures of another resolution,
+    `is_reordered` if its coefficients were in another order than OpenCV's; `searched`: the search that found it, None
+    if it stands where the file puts it; `explained`: share of the paint in the frame, 0..1, on the markings as the file
+    puts them, None where little paint is seen.
     """
 
+    pitch: Field
     given: Camera
     has_pose: bool
     reading: Reading
@@ -71,6 +74,17 @@ class CheckedCamera:
     is_reordered: bool = False
     searched: Search | None = None
     explained: float | None = None
+
+    @property
+    def stands(self) -> bool:
+        """True if its frame shows it where it was meant to be."""
+        return self.found is not None and self.moved_px <= good_within_px(self.meant)
+
+    @property
+    def moved_px(self) -> float:
+        """Mean shift of the markings in view from where it was meant to be to where it was found."""
+        assert self.found is not None
+        return Moved.between(self.pitch, self.meant, self.found.camera).pixels
 
     @property
     def is_clearly_wrong(self) -> bool:
@@ -107,6 +121,7 @@ def check_cameras(
     progress.at_fraction("refinement", 0.0)
     checker.calibrate_as(TAKEN_AT_ITS_WORD, resized=False)
     checker.calibrate_reordered()
+    checker.calibrate_on_fitted_field()
     progress.at_fraction("segmentation", READINGS_AT)
     for reading, resized in checker.likeliest_readings():
         checker.calibrate_as(reading, resized=resized)
@@ -161,22 +176,45 @@ class _Checker:
                 given.reordered is None
                 or not given.has_pose
                 or id in self.unusable
-                or self._stands(self.settled.get(id))
+                or (id in self.settled and self.settled[id].stands)
             ):
                 continue
             meant = given.camera.with_lens(given.reordered)
             for result in self._calibrated([meant], "never"):
                 reordered = CheckedCamera(
-                    given.camera, True, TAKEN_AT_ITS_WORD, meant, result, None, given.is_resized, is_reordered=True
+                    self.pitch,
+                    given.camera,
+                    True,
+                    TAKEN_AT_ITS_WORD,
+                    meant,
+                    result,
+                    None,
+                    given.is_resized,
+                    is_reordered=True,
                 )
-                if result.accepted and self._stands(reordered):
+                if result.accepted and reordered.stands:
                     self.settled[id] = reordered
 
-    def _stands(self, checked: CheckedCamera | None) -> bool:
-        """True for a camera whose frame shows it where it was meant to be."""
-        if checked is None or checked.found is None:
-            return False
-        return Moved.between(self.pitch, checked.meant, checked.found.camera).pixels <= good_within_px(checked.meant)
+    def calibrate_on_fitted_field(self) -> None:
+        """Calibrate the settled cameras on the field that their lines show, if more of them stand there.
+
+        A crown that nobody told, or a length that is another, looks like cameras that have moved.
+        """
+        settled = [one for one in self.settled.values() if one.found is not None]
+        if all(one.stands for one in settled):
+            return
+        found = [one.found.camera for one in settled if one.found is not None]
+        fitted = fit_field(self.pitch, found, {one.id: self.frames[one.id] for one in found}, self.segment, self.seed)
+        if fitted.rejected_because is not None or not any(measure.known for measure in fitted.measures):
+            return
+        results = self._calibrated([one.meant for one in settled], "never", fitted.pitch)
+        there = [
+            replace(one, pitch=fitted.pitch, found=result)
+            for one, result in zip(settled, results, strict=True)
+            if result.accepted
+        ]
+        if sum(one.stands for one in there) > sum(one.stands for one in settled):
+            self.settled |= {one.given.id: one for one in there}
 
     def calibrate_turned(self) -> None:
         """Calibrate the open cameras where they stand, whatever way they look."""
@@ -215,6 +253,7 @@ class _Checker:
             if len(paint.middles) >= LEAST_PAINT:
                 explained = paint.explained_by(self.pitch, given.camera) if given.has_pose else None
         return CheckedCamera(
+            self.pitch,
             given.camera,
             given.has_pose,
             TAKEN_AT_ITS_WORD,
@@ -248,13 +287,16 @@ class _Checker:
             self._responses[id] = self.segment(self.frames[id][0], whole_frame(given.camera.intrinsics.size))
         return self._responses[id]
 
-    def _calibrated(self, cameras: Sequence[Camera], recover: Recover) -> Sequence[CameraResult]:
+    def _calibrated(
+        self, cameras: Sequence[Camera], recover: Recover, pitch: Field | None = None
+    ) -> Sequence[CameraResult]:
+        """Return the results of cameras on the given field, or another; none if they see no markings."""
         if not cameras:
             return []
         options = Options(seed=self.seed, recover=recover, lens_may_drift=True)
         try:
             found = calibrate(
-                self.pitch, cameras, {one.id: self.frames[one.id] for one in cameras}, self.segment, options
+                pitch or self.pitch, cameras, {one.id: self.frames[one.id] for one in cameras}, self.segment, options
             )
         except CalibrationError as error:
             self.refusals.setdefault(error.camera, error.detail)
@@ -277,7 +319,7 @@ class _Checker:
         given = self.given[id]
         is_resized = given.is_resized or (resized and given.resized is not None)
         self.settled[id] = CheckedCamera(
-            given.camera, given.has_pose, reading, meant, found, None, is_resized, searched=searched
+            self.pitch, given.camera, given.has_pose, reading, meant, found, None, is_resized, searched=searched
         )
 
     def _lens(self, given: GivenCamera, resized: bool) -> Lens:

@@ -42,13 +42,13 @@ class GradedCamera:
     difference: Difference | None
 
 
-def grade(pitch: Field, checked: CheckedCamera, lens_folds: str | None) -> GradedCamera:
+def grade(checked: CheckedCamera, lens_folds: str | None) -> GradedCamera:
     """Return the grade of a camera; `lens_folds`: words about a lens that has no rays for a part of the picture.
 
     A lens that folds where no marking is, in a corner of the sky, does no harm.
     """
     folds: list[tuple[CauseOfGrade, str]] = [] if lens_folds is None else [("folds", lens_folds)]
-    found = checked.found
+    pitch, found = checked.pitch, checked.found
     if found is None:
         return _not_found(checked, folds)
     if not checked.has_pose:
