@@ -16,7 +16,7 @@ from worker.calibration.planning.line_state import STATES, StateName
 from worker.calibration.planning.plan import Plan, plan
 from worker.calibration.planning.variations import panned
 
-PITCH = Field(105.0, 68.0, 0.12, np.array([[-18.5, 0.0, 0.3], [18.5, 0.0, 0.3]]), sigma=TAPED)
+MEASURED = Field(105.0, 68.0, 0.12, np.array([[-18.5, 0.0, 0.3], [18.5, 0.0, 0.3]]), sigma=TAPED)
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,8 @@ class Stand:
     """Two cameras on one mast beside the halfway line, each over a half of a football pitch.
 
     `away_m` from the touchline; `wide_deg`: horizontal field of view; `closer_deg`: turned towards each other;
-    `second_side`: -1 where the second camera stands on the other side of the pitch.
+    `second_side`: -1 where the second camera stands on the other side of the pitch; `pitch`: the field, as well known
+    as its `sigma` says.
     """
 
     height_m: float = 12.0
@@ -35,17 +36,18 @@ class Stand:
     second_side: int = 1
     state: StateName = "fresh"
     hidden: float = 0.0
+    pitch: Field = MEASURED
 
     def plan(self) -> Plan:
         """Return the plan of both cameras."""
-        return plan(PITCH, [self._camera(-1), self._camera(1)], STATES[self.state], self.hidden)
+        return plan(self.pitch, [self._camera(-1), self._camera(1)], STATES[self.state], self.hidden)
 
     def _camera(self, side: int) -> Camera:
         size = self.width_px, self.width_px * 9 // 16
         focal = size[0] / 2 / np.tan(np.radians(self.wide_deg / 2))
         matrix = np.array([[focal, 0, (size[0] - 1) / 2], [0, focal, (size[1] - 1) / 2], [0, 0, 1]])
         near = 1 if side < 0 else self.second_side
-        position = [0.5 * side, -near * (PITCH.width / 2 + self.away_m), self.height_m]
+        position = [0.5 * side, -near * (self.pitch.width / 2 + self.away_m), self.height_m]
         pose = Pose.looking_at(position, [24.0 * side, -near * 10.0, 0.0])
         camera = Camera("left" if side < 0 else "right", Intrinsics(matrix, np.zeros(5), size), pose)
         return panned(camera, side * near * self.closer_deg / 2)
@@ -64,6 +66,7 @@ STANDS = {
     "1920 pixels wide": replace(USUAL, width_px=1920),
     "worn lines": replace(USUAL, state="worn"),
     "half of the lines hidden": replace(USUAL, hidden=0.5),
+    "a pitch that nobody measured": replace(USUAL, pitch=replace(MEASURED, sigma={})),
 }
 """Stands of the table, each unlike the first in what its name says."""
 

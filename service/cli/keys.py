@@ -52,7 +52,10 @@ def add_key(
             key = keys.add(name, scope, datetime.now(UTC) + timedelta(days) if days else None, venues or None)
         except KeyExists:
             fail(f"There is a key {name} already: remove it first, or take another name.", USAGE)
+        is_first = len(keys.all()) == 1
     _print_key(key)
+    if is_first:
+        print_note("This is the first key: from now on every caller needs one.")
 
 
 @app.command("list")

@@ -70,14 +70,22 @@ def plan(
 
 
 def _print_plan(result: PlanResult) -> None:
-    """Print a line for each camera and each pair, and what decides it; sigmas in centimetres."""
+    """Print a line for each camera and each pair, and what decides it: sigmas in centimetres, as medians."""
     print_rows(
-        ["CAMERA", "SEES", "PX PER M, MEDIAN (LEAST)", "POSE", "A PLAYER'S PLACE, MEDIAN (WORST)", "1 M HIGHER"],
+        [
+            "CAMERA",
+            "PAN, TILT, WIDTH",
+            "SEES",
+            "PX PER M ACROSS, ALONG",
+            "POSE",
+            "A PLAYER'S PLACE (WORST)",
+            "1 M HIGHER",
+        ],
         [_camera_row(camera) for camera in result.cameras],
     )
     for camera in result.cameras:
         most = [f"{one.marking} ({_change_text(one.without)})" for one in camera.decisive_markings[:3]]
-        print(f"{camera.id} can least do without: {', '.join(most) or 'nothing'}")
+        print(f"{camera.id} is calibrated to, with and without: {', '.join(most) or 'it can do without any marking'}")
     if result.pairs:
         print_rows(
             ["PAIR", "OVERLAP", "STITCH", "5 DEGREES MORE"],
@@ -94,11 +102,13 @@ def _print_plan(result: PlanResult) -> None:
 
 
 def _camera_row(camera: PlannedCameraResult) -> list[str]:
-    place, resolution = camera.place_m, camera.px_per_metre
+    place, across, along = camera.place_m, camera.px_per_metre, camera.px_per_metre_along
+    wide = "-" if camera.field_of_view_deg is None else f"{camera.field_of_view_deg:.0f}"
     return [
         camera.id,
+        f"{camera.pan_deg:.1f}, {camera.tilt_deg:.1f}, {wide} deg",
         f"{camera.share_of_field:.0%}",
-        "-" if resolution is None else f"{resolution.median:.0f} ({resolution.worst:.0f})",
+        "-" if across is None or along is None else f"{across.median:.0f}, {along.median:.1f}",
         f"{camera.sigma.rotation_deg:.3f} deg, {_cm(camera.sigma.position_m)}",
         "-" if place is None else f"{_cm(place.median)} ({_cm(place.worst)})",
         "-" if camera.one_metre_higher is None else _change_text(camera.one_metre_higher),

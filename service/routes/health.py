@@ -61,7 +61,7 @@ async def get_metrics(context: InContext) -> Response:
 async def explain_problem(
     kind: Annotated[str, Path(max_length=64, description="Last part of the `type`.")], response: Response
 ) -> dict[str, str | int]:
-    """Explain what the `type` of a problem means; browsers (`Accept: text/html`) get a page."""
+    """Return title and status of a type of problem; browsers (`Accept: text/html`) get a page with advice."""
     response.headers.update(OF_PROGRAMS)
     if kind not in PROBLEM_TYPES:
         raise Problem("not-found", f"The kinds of problems are {', '.join(PROBLEM_TYPES)}.")

@@ -106,7 +106,7 @@ class Job(Schema):
     queue_position: int | None = Field(description="Position in the queue, 1 = next; null unless queued.")
     attempt: int = Field(description="Number of starts of the job; above 1 after a crash of its worker.")
     created_at: datetime = Field(description="Time of its submission.")
-    started_at: datetime | None = Field(description="Time of its last start; null while queued.")
+    started_at: datetime | None = Field(description="Time of its first start; null while queued.")
     finished_at: datetime | None = Field(description="Time of its end; null while open.")
     error: JobError | None
     result: Annotated[AnyResult | None, WrapValidator(_read_result)] = Field(
@@ -178,7 +178,7 @@ class JobSummary(Schema):
     progress: Progress | None
     attempt: int = Field(description="Number of starts.")
     created_at: datetime = Field(description="Time of its submission.")
-    started_at: datetime | None = Field(description="Time of its last start; null while queued.")
+    started_at: datetime | None = Field(description="Time of its first start; null while queued.")
     finished_at: datetime | None = Field(description="Time of its end; null while open.")
     error: JobError | None
     verdict: str | None = Field(description="Verdict of a calibration's result.")

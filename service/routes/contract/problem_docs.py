@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from http import HTTPStatus
 from typing import Any
 
-from service.routes.contract.documented import SCHEMAS
+from service.routes.contract.documented import HEADERS, SCHEMAS
 from service.schemas.names import problem_uri
 from service.schemas.problems import MEDIA_TYPE, PROBLEM_TYPES, ProblemDetails
 
@@ -42,6 +42,8 @@ OF_UPLOADS = (
 )
 OF_FRAMES = (*OF_UPLOADS, "unknown-camera", "missing-camera", "too-many-frames", "frame-size", "venue-replaced")
 OF_SOURCES = ("source-refused", "source-failed")
+# Statuses of problems that may pass: their answers can have a Retry-After.
+MAY_BE_REPEATED = frozenset({HTTPStatus.CONFLICT, HTTPStatus.TOO_MANY_REQUESTS, HTTPStatus.SERVICE_UNAVAILABLE})
 # Of exported poses.
 OF_EXPORTS = ("unknown-camera", "camera-needed", "format-cannot-hold", "refined-not-found", "extra-missing")
 OF_ADDRESSES = {
@@ -76,6 +78,8 @@ def document_problems(method: str, path: str, operation: dict[str, Any]) -> None
             response["description"] = "\n".join([f"{HTTPStatus(int(status)).phrase}:", "", *lines])
             schema = {"$ref": f"{SCHEMAS}{ProblemDetails.__name__}"}
             response["content"] = response.get("content", {}) | {MEDIA_TYPE: {"schema": schema}}
+            if int(status) in MAY_BE_REPEATED:
+                response["headers"] = response.get("headers", {}) | {"Retry-After": HEADERS["Retry-After"]}
 
 
 def _common_kinds(method: str, path: str, operation: dict[str, Any]) -> Iterator[str]:
