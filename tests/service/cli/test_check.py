@@ -68,6 +68,30 @@ def test_true_cameras_are_good(tmp_path, frames, capsys):
     assert all(one["off_px"] < 2 and one["causes"] == [] for one in answer["cameras"])
 
 
+@pytest.mark.long
+@pytest.mark.parametrize(("turn_deg", "grade"), [(0.0, "good"), (0.6, "drifted")])
+def test_a_crown_that_nobody_said_is_no_motion_of_the_cameras(tmp_path, capsys, turn_deg, grade):
+    (tmp_path / "site.json").write_text('{"id": "pair", "field": {"template": "football", "line_width_m": 0.12}}')
+    crowned = rendered_pair.PITCH.flat().raised(0.6)
+    for one in rendered_pair.cameras():
+        frame = render_frame(crowned, one, Conditions.fair(22), np.random.default_rng(0)).frame
+        (tmp_path / f"{one.id}.jpg").write_bytes(rendered_pair.encoded(frame))
+    cameras = [
+        replace(
+            one,
+            pose=Pose.from_position(
+                [one.pose.rotation[0] + math.radians(turn_deg), *one.pose.rotation[1:]], one.pose.position
+            ),
+        )
+        for one in records()
+    ]
+    _, answer, _ = run(tmp_path, tmp_path, cameras, "colmap", capsys)
+    assert answer["grade"] == grade
+    if grade == "good":
+        assert abs(answer["field"]["ridge"][0][2] - 0.6) < 0.1
+        assert "ridge 0." in answer["warnings"][0]
+
+
 def test_centimetres_and_a_turn_are_told_and_corrected(tmp_path, frames, capsys):
     turned = [one.pose.rotation[0] + math.radians(0.6) for one in records()]
     cameras = [
