@@ -62,8 +62,10 @@ def convert(
     What the format cannot hold is said; where points would be off, nothing is written.
     """
     form = to or FILE_NAMES.get(output.name) or SUFFIXES.get(output.suffix)
-    if form is None or form not in FILE_FORMATS:
+    if form is None:
         fail(f"Say the format of {output}: --to with one of {', '.join(FILE_FORMATS)}", USAGE)
+    if form not in FILE_FORMATS:
+        fail(f"{form} is written of a stored venue only: esc venue poses VENUE --format {form} -o {output}", USAGE)
     found = read_calibration(sources)
     cameras = chosen_cameras(found, camera)
     if image_size is not None:

@@ -38,7 +38,7 @@ def test_a_zip_is_written_and_read(tmp_path):
     ("options", "code", "words"),
     [
         ({}, 2, "Say the format of"),
-        ({"to": "freed"}, 2, "Say the format of"),
+        ({"to": "freed"}, 2, "freed is written of a stored venue only: esc venue poses VENUE --format freed"),
         ({"to": "json", "size": "1920"}, 2, "expected WIDTHxHEIGHT, for instance 1920x1080"),
         ({"to": "json", "crop": "1,2"}, 2, "expected X,Y,WIDTH,HEIGHT"),
         ({"to": "json", "crop": "3000,0,1000,1000"}, 2, "the crop leaves the 3840x2160 pixels of camera left"),
