@@ -83,7 +83,9 @@ def require_folder_of(file: Path) -> Path:
 Sport = Annotated[str | None, typer.Option("--sport", help="Sport of the field: football, tennis ...")]
 FieldSize = Annotated[
     str | None,
-    typer.Option("--field", metavar="LENGTHxWIDTH", help="Size of the field, m; otherwise the sport's usual one."),
+    typer.Option(
+        "--field", metavar="LENGTHxWIDTH", help="Size of the field in metres; default: the sport's usual size."
+    ),
 ]
 Url = Annotated[
     str,
@@ -137,12 +139,11 @@ LensOption = Annotated[
     LensChoice,
     typer.Option(
         "--lens",
-        help="stored: the poses for the lenses that the venue has; refined: poses and lenses as the lines have both.",
+        help="stored: the poses in use, with the venue's lenses; "
+        "refined: poses and lenses that fit the lines best, to measure in the world.",
     ),
 ]
-OneCamera = Annotated[
-    str | None, typer.Option("--camera", metavar="CAMERA", help="Id of the one camera that is wanted; otherwise all.")
-]
+OneCamera = Annotated[str | None, typer.Option("--camera", metavar="CAMERA", help="Id of one camera; default: all.")]
 Output = Annotated[Path | None, typer.Option("-o", "--output", help="File to write; otherwise standard output.")]
 VenueOutput = Annotated[
     Path,
@@ -167,12 +168,14 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print JSON in place of lin
 AnswerAsJson = Annotated[
     bool, typer.Option("--json", help="Print JSON at a terminal too; what goes to a file or a pipe is JSON anyway.")
 ]
-Yes = Annotated[
-    bool, typer.Option("--yes", help="Do not ask; without a terminal, where nobody can be asked, it is required.")
-]
+Yes = Annotated[bool, typer.Option("--yes", help="Do not ask for confirmation; required without a terminal.")]
 IdempotencyKey = Annotated[
     str | None,
-    typer.Option("--idempotency-key", metavar="KEY", help="Any word: sent twice with the same word, it is one job."),
+    typer.Option(
+        "--idempotency-key",
+        metavar="KEY",
+        help="Idempotency key, any word: two requests with the same key are one job.",
+    ),
 ]
 OptionsText = Annotated[
     str,

@@ -35,14 +35,16 @@ def check(
             "--site",
             exists=True,
             dir_okay=False,
-            help="In place of --sport: the JSON file of a venue, for its field; that of a venue to check has one.",
+            help="JSON file of a venue, for its field, in place of --sport; a venue that is checked has its own.",
         ),
     ] = None,
     output: Annotated[
         Path | None,
         typer.Option("-o", "--output", help="File or folder for the corrected calibration, in the same format."),
     ] = None,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Any number: the same one finds the same.")] = 0,
+    seed: Annotated[
+        int, typer.Option("--seed", min=0, help="Seed of the random numbers; the same seed gives the same result.")
+    ] = 0,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON in place of a table.")] = False,
 ) -> None:
     """Check a calibration of any tool by frames. Exit: 0 good, 1 failed, 2 usage, 3 drifted or wrong, 4 cannot tell.

@@ -29,7 +29,9 @@ def find(
     pictures: Annotated[
         Path | None, typer.Option("--pictures", help="Folder for a picture of each candidate of each camera.")
     ] = None,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Any number: the same one finds the same.")] = 0,
+    seed: Annotated[
+        int, typer.Option("--seed", min=0, help="Seed of the random numbers; the same seed gives the same result.")
+    ] = 0,
     as_json: AnswerAsJson = False,
 ) -> None:
     """Find cameras from their frames and the field alone. Exit: 0 all found, 1 failed, 2 usage, 3 not all, or not sure.

@@ -43,15 +43,15 @@ def _check_job_ids(jobs: list[str] | None) -> list[str]:
 
 @app.command("list")
 def list_jobs(
-    venue: Annotated[str | None, typer.Option("--venue", metavar="VENUE", help="Only those of one venue.")] = None,
-    status: Annotated[JobStatus | None, typer.Option("--status", help="Only those in this state.")] = None,
-    kind: Annotated[JobKind | None, typer.Option("--kind", help="Only those of this kind.")] = None,
-    limit: Annotated[int, typer.Option("--limit", min=1, help="How many at most.")] = 20,
+    venue: Annotated[str | None, typer.Option("--venue", metavar="VENUE", help="Only jobs of this venue.")] = None,
+    status: Annotated[JobStatus | None, typer.Option("--status", help="Only jobs in this state.")] = None,
+    kind: Annotated[JobKind | None, typer.Option("--kind", help="Only jobs of this kind.")] = None,
+    limit: Annotated[int, typer.Option("--limit", min=1, help="Largest number of jobs.")] = 20,
     as_json: AsJson = False,
     url: Url = DEFAULT_URL,
     api_key: ApiKey = None,
 ) -> None:
-    """Print a line per job, newest first: id, when it was submitted, venue, kind, status, and what came of it."""
+    """Print a line per job, newest first: id, time of submission, venue, kind, status, outcome."""
     with open_client(url, api_key) as client:
         jobs = client.jobs(venue, status, kind, limit)
     if as_json:
@@ -85,9 +85,11 @@ def submit_again(
         typer.Argument(metavar="[JOB...]", callback=_check_job_ids, help="Ids of jobs, as `esc job list` prints them."),
     ] = None,
     failed: Annotated[
-        bool, typer.Option("--failed", help="Of each venue the newest job that failed and whose frames are kept.")
+        bool, typer.Option("--failed", help="Repeat each venue's newest failed job whose frames are kept.")
     ] = False,
-    venue: Annotated[str | None, typer.Option("--venue", metavar="VENUE", help="With --failed: of one venue.")] = None,
+    venue: Annotated[
+        str | None, typer.Option("--venue", metavar="VENUE", help="With --failed: only this venue.")
+    ] = None,
     wait: Annotated[
         bool, typer.Option("--wait", help="Follow the new job to its end, as `esc job wait` does.")
     ] = False,
@@ -95,9 +97,10 @@ def submit_again(
     url: Url = DEFAULT_URL,
     api_key: ApiKey = None,
 ) -> None:
-    """Compute the frames of a job once more, with its options, from the poses in use: a new job.
+    """Submit the frames and options of a job once more, as a new job that begins from the poses in use.
 
-    Of several jobs a line each: its id, the new job's, or why there is none. Exit: 1 if one was refused.
+    With several jobs, print a line for each: its id, and that of the new job or why there is none.
+    Exit: 1 if one was refused.
     """
     if bool(jobs) == failed or (venue and not failed) or (wait and (failed or len(jobs or ()) > 1)):
         fail("Name jobs, or --failed with or without --venue; --wait is for one job", USAGE)
@@ -130,15 +133,18 @@ def picture_of_job(
     job: JobId,
     picture: Annotated[
         str | None,
-        typer.Argument(metavar="[PICTURE]", help="Such as preview or overlay/left; otherwise all are named."),
+        typer.Argument(
+            metavar="[PICTURE]",
+            help="Name of a picture, such as preview or overlay/left; without it, the names are printed.",
+        ),
     ] = None,
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="File to write; otherwise one named as the picture, here.")
+        Path | None, typer.Option("-o", "--output", help="File to write; default: the picture's name, in this folder.")
     ] = None,
     url: Url = DEFAULT_URL,
     api_key: ApiKey = None,
 ) -> None:
-    """Save a picture of a job and print its file; without a name, print the names of those there are."""
+    """Save a picture of a job and print its file; without a name, print the names of all."""
     with open_client(url, api_key) as client:
         found = client.job(job)
         names = [name for name in found.links if name not in NOT_PICTURES]
@@ -176,14 +182,14 @@ def accept_job(
     url: Url = DEFAULT_URL,
     api_key: ApiKey = None,
 ) -> None:
-    """Put the poses of a job to use that the gate rejected, or that was a dry run."""
+    """Store the poses of a job that the gate rejected or that was a dry run; confirm those of an accepted one."""
     with open_client(url, api_key) as client:
         print_answer(client.accept(job, camera), as_json=as_json, with_outcome=False)
 
 
 @app.command("reject")
 def reject_job(job: JobId, as_json: AnswerAsJson = False, url: Url = DEFAULT_URL, api_key: ApiKey = None) -> None:
-    """Put back the poses that held before those of a job."""
+    """Restore the poses from before a job."""
     with open_client(url, api_key) as client:
         print_answer(client.reject(job), as_json=as_json, with_outcome=False)
 

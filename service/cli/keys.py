@@ -25,23 +25,21 @@ app = typer.Typer(no_args_is_help=True, help="API keys, in the database of this 
 
 @app.command("add")
 def add_key(
-    name: Annotated[str, typer.Argument(help="Name for the key: of the machine or person that will use it.")],
+    name: Annotated[str, typer.Argument(help="Name of the key, for example the machine or person that will use it.")],
     scope: Annotated[
         Scope,
-        typer.Option(
-            "--scope", help="What it may do: read; calibrate, which includes that; admin, which includes both."
-        ),
+        typer.Option("--scope", help="Scope: read; calibrate, which includes read; admin, which includes both."),
     ],
     days: Annotated[
-        int | None, typer.Option("--days", min=1, max=36500, help="Days after which it expires; otherwise never.")
+        int | None, typer.Option("--days", min=1, max=36500, help="Days until the key expires; default: never.")
     ] = None,
     venues: Annotated[
         list[str] | None,
-        typer.Option("--venue", metavar="ID", help="A venue that it is for, repeatable; otherwise it is for all."),
+        typer.Option("--venue", metavar="ID", help="Venue that the key works for, repeatable; default: all venues."),
     ] = None,
     data: Data = None,
 ) -> None:
-    """Make a key and print it, this once: what is stored is its hash."""
+    """Make a key and print it. It is shown only once: ESC stores its hash."""
     if not re.fullmatch(ID_PATTERN, name):
         fail(f"{name!r} is no name of a key: {ID_IN_WORDS}.", USAGE)
     for venue in venues or ():
@@ -75,11 +73,11 @@ def list_keys(data: Data = None) -> None:
 def rotate_key(
     name: Annotated[str, typer.Argument(help="Name of the key, as `esc key list` prints it.")],
     grace: Annotated[
-        str, typer.Option("--grace", metavar="TIME", help="How long the old key stays good, such as 30m, 24h or 7d.")
+        str, typer.Option("--grace", metavar="TIME", help="How long the old key still works, such as 30m, 24h or 7d.")
     ] = "24h",
     data: Data = None,
 ) -> None:
-    """Make a new key in place of another and print it, this once; the old one stays good for a while, as NAME-old."""
+    """Replace a key by a new one and print that, only once; the old one works for a while longer, as NAME-old."""
     length = re.fullmatch(r"(\d{1,5})([mhd])", grace, re.ASCII)
     if length is None:
         fail(f"{grace!r} is no time: a number and m, h or d, such as 30m, 24h or 7d.", USAGE)

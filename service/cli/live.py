@@ -67,13 +67,11 @@ def live(
         list[str] | None,
         typer.Argument(
             metavar="[CAMERA=STREAM...]",
-            help="Follow a camera in the pictures of its stream, such as left=rtsp://10.1.0.7/main. Needs the extra "
-            "`video`. Of other cameras the stored pose is sent.",
+            help="Follow a camera in the pictures of its stream, such as left=rtsp://10.1.0.7/main. "
+            "Needs the extra `video`. For the other cameras, the stored pose is sent.",
         ),
     ] = None,
-    hold: Annotated[
-        bool, typer.Option("--hold", help="Send the stored poses alone, as is done where no stream is given.")
-    ] = False,
+    hold: Annotated[bool, typer.Option("--hold", help="Send only the stored poses, as without any stream.")] = False,
     follow_every: Annotated[
         int, typer.Option("--follow-every", min=1, max=25, metavar="N", help="Measure in every Nth picture only.")
     ] = 1,

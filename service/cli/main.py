@@ -123,7 +123,7 @@ app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False, cls=Lazy
 @app.callback()
 def esc(
     _: Annotated[
-        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and end.")
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit.")
     ] = False,
 ) -> None:
     """Keeps fixed multi-camera installations on sports fields calibrated."""

@@ -19,7 +19,7 @@ def mcp(
         typer.Option(
             "--allow-storing",
             envvar="ESC_MCP_ALLOW_STORING",
-            help="Let assistants store poses of dry runs, as far as the quality gate has accepted them.",
+            help="Let assistants store poses of dry runs that the quality gate accepted.",
         ),
     ] = False,
     url: Url = DEFAULT_URL,

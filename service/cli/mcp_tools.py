@@ -26,7 +26,7 @@ WAIT_S = 45.0
 VenueId = Annotated[str, Field(pattern=ID_PATTERN, description="Id of a venue, from list_venues.")]
 CameraId = Annotated[str, Field(pattern=ID_PATTERN, description="Id of a camera of the venue.")]
 JobId = Annotated[str, Field(pattern=JOB_ID_PATTERN, description="Id of a job.")]
-Most = Annotated[int, Field(ge=1, le=100, description="How many at most, the newest.")]
+Most = Annotated[int, Field(ge=1, le=100, description="Largest number, the newest first.")]
 P = ParamSpec("P")
 T = TypeVar("T")
 

@@ -90,7 +90,7 @@ def intrinsics(
     charuco: Annotated[
         str | None,
         typer.Option(
-            "--charuco", metavar="4X4_50:0.022", help="Of a ChArUco board: dictionary, and side of a marker in metres."
+            "--charuco", metavar="4X4_50:0.022", help="For a ChArUco board: dictionary, and side of a marker in metres."
         ),
     ] = None,
     model: Annotated[
@@ -153,7 +153,7 @@ def pose(
             metavar="SPORT",
             is_eager=True,
             callback=_print_points,
-            help="Print the names of a sport's points with their usual places [x, y] in metres, and do nothing else.",
+            help="Print the names of a sport's points with their usual places [x, y] in metres, and exit.",
         ),
     ] = None,
 ) -> None:
@@ -212,7 +212,11 @@ def fit_field(
     pictures: Annotated[Path | None, typer.Option("--pictures", help="Folder for a picture per camera.")] = None,
     seed: Annotated[
         int | None,
-        typer.Option("--seed", min=0, help="Any number: the same one finds the same. Otherwise one is chosen."),
+        typer.Option(
+            "--seed",
+            min=0,
+            help="Seed of the random numbers; the same seed gives the same result. Default: a random one.",
+        ),
     ] = None,
     as_json: AnswerAsJson = False,
     url: Url = DEFAULT_URL,

@@ -58,7 +58,7 @@ def stitch(
     audio: Annotated[
         str | None,
         typer.Option(
-            "--audio", metavar="CAMERA|none", help="Whose sound is kept; otherwise that of the first clip that has any."
+            "--audio", metavar="CAMERA|none", help="Camera whose sound is kept; default: the first clip with sound."
         ),
     ] = None,
     rate: Annotated[
@@ -68,14 +68,13 @@ def stitch(
         ),
     ] = None,
     begin: Annotated[
-        str | None, typer.Option("--from", metavar="TIME", help="Where to begin: seconds, or hours:minutes:seconds.")
+        str | None,
+        typer.Option("--from", metavar="TIME", help="Begin at this time: seconds, or hours:minutes:seconds."),
     ] = None,
-    end: Annotated[str | None, typer.Option("--to", metavar="TIME", help="Where to end.")] = None,
+    end: Annotated[str | None, typer.Option("--to", metavar="TIME", help="End at this time.")] = None,
     allow_missing: Annotated[
         bool,
-        typer.Option(
-            "--allow-missing", help="Without a camera whose clip is not given or has ended, go on with others."
-        ),
+        typer.Option("--allow-missing", help="Go on without cameras whose clip is missing or has ended."),
     ] = False,
     projection: ProjectionOption = None,
     width: Annotated[int | None, typer.Option("--width", min=64, max=8192, help="In pixels, even.")] = None,
@@ -88,7 +87,7 @@ def stitch(
         int, typer.Option("--crf", min=0, max=51, help="Quality of libx264 and libx265, 0 loses nothing.")
     ] = 20,
     preset: Annotated[
-        str, typer.Option("--preset", help="Of libx264 and libx265, ultrafast to veryslow.")
+        str, typer.Option("--preset", help="Preset of libx264 and libx265, ultrafast to veryslow.")
     ] = "veryfast",
     seam: Annotated[
         Literal["static", "people"],

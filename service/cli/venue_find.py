@@ -40,11 +40,11 @@ AdoptedCamera = Annotated[
     ),
 ]
 AdoptedField = Annotated[
-    FieldNumber | None, typer.Option("--field", help="Instead of a lens: a number of the field, with --job.")
+    FieldNumber | None, typer.Option("--field", help="Store a measure of the field instead of a lens; needs --job.")
 ]
 AdoptedJob = Annotated[
     str | None,
-    typer.Option("--job", metavar="JOB", callback=check_job_id, help="The calibration whose lines have it."),
+    typer.Option("--job", metavar="JOB", callback=check_job_id, help="The calibration that measured it."),
 ]
 AdoptedFinding = Annotated[
     str | None,
@@ -52,7 +52,7 @@ AdoptedFinding = Annotated[
         "--found",
         metavar="JOB",
         callback=check_job_id,
-        help="Instead of a lens: the cameras that this job of `esc venue find` has found.",
+        help="Store the cameras that this job of `esc venue find` found, instead of a lens.",
     ),
 ]
 CalibrateFound = Annotated[
@@ -64,8 +64,8 @@ Candidates = Annotated[
     typer.Option(
         "--candidate",
         metavar="CAMERA=NUMBER",
-        help="With --found: the candidate that a camera is taken to be, from 1; 0: none of them. Otherwise the first "
-        "one, of cameras that were accepted.",
+        help="With --found: number of the candidate to take for a camera, from 1; 0 takes none. "
+        "Default: the first, for accepted cameras.",
     ),
 ]
 
@@ -75,7 +75,9 @@ def find_cameras(
     frames: Frames,
     sport: Annotated[
         str | None,
-        typer.Option("--sport", help="Of a venue that is not stored yet: football, tennis ... in its usual measures."),
+        typer.Option(
+            "--sport", help="Sport of a venue that is not stored yet: football, tennis ... in its usual measures."
+        ),
     ] = None,
     site: Annotated[
         Path | None,
@@ -84,7 +86,7 @@ def find_cameras(
             metavar="SITE.json",
             exists=True,
             dir_okay=False,
-            help="Of a venue that is not stored yet: field, and what is known of its cameras, as for `esc find`.",
+            help="For a venue that is not stored yet: field, and what is known of its cameras, as for `esc find`.",
         ),
     ] = None,
     options: Annotated[
@@ -92,7 +94,7 @@ def find_cameras(
         typer.Option(
             "--options",
             metavar="JSON",
-            help='Of a stored venue: {"cameras": ["left"]} looks for these alone, {"find_lens": '
+            help='For a stored venue: {"cameras": ["left"]} looks for these alone, {"find_lens": '
             'true} finds lenses as well, {"position_radius_m": 2} looks within 2 m of the stored place.',
         ),
     ] = "{}",
@@ -110,7 +112,7 @@ def find_cameras(
 ) -> None:
     """Find cameras of a venue from their frames alone. Exit: 0 all found, 1 failed, 2 usage, 3 not all, or not sure.
 
-    Of a stored venue those that frames are given of; of a venue that is not stored yet, with --sport or --site, all.
+    For a stored venue: the cameras that frames are given for. With --sport or --site: all cameras of a new venue.
     Nothing is stored before --adopt, or `esc venue adopt VENUE --found JOB`.
     """
     files = parse_frame_files(frames)

@@ -22,7 +22,7 @@ from service.schemas.trend import Trend
 
 def venue_history(
     venue: VenueId,
-    limit: Annotated[int, typer.Option("--limit", min=1, help="How many at most, the newest.")] = 20,
+    limit: Annotated[int, typer.Option("--limit", min=1, help="Largest number, the newest first.")] = 20,
     as_json: AsJson = False,
     url: Url = DEFAULT_URL,
     api_key: ApiKey = None,
@@ -82,7 +82,7 @@ def venue_health(venue: VenueId, as_json: AnswerAsJson = False, url: Url = DEFAU
 
 def follow_venue(
     venue: VenueId,
-    only: Annotated[EventKind | None, typer.Option("--only", help="Only what is of this kind; otherwise all.")] = None,
+    only: Annotated[EventKind | None, typer.Option("--only", help="Only events of this kind; default: all.")] = None,
     as_json: AsJson = False,
     url: Url = DEFAULT_URL,
     api_key: ApiKey = None,

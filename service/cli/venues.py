@@ -66,18 +66,18 @@ def put_venue(
     ] = None,
     keep_poses: Annotated[
         bool,
-        typer.Option(
-            "--keep-poses", help="Keep the stored poses, with their lenses and ridge, whatever the file says."
-        ),
+        typer.Option("--keep-poses", help="Keep the stored poses, lenses and ridge, whatever the file says."),
     ] = False,
-    force: Annotated[bool, typer.Option("--force", help="Put it whatever would be lost by that.")] = False,
+    force: Annotated[
+        bool, typer.Option("--force", help="Store the file even if poses, alarms, a schedule or sources are lost.")
+    ] = False,
     as_json: AnswerAsJson = False,
     url: Url = DEFAULT_URL,
     api_key: ApiKey = None,
 ) -> None:
     """Create or replace a venue from a file. Exit 1: nothing was put, something would be lost by it.
 
-    The world of a calibration has to begin in the middle of the field, as `esc check -o` writes it.
+    A calibration must have its origin in the middle of the field, as `esc check -o` writes it.
     """
     if sport is None:
         venue = parse_document(VenueIn, file.read_bytes(), str(file))
@@ -122,7 +122,7 @@ def set_venue(
     url: Url = DEFAULT_URL,
     api_key: ApiKey = None,
 ) -> None:
-    """Change parts of a venue and leave the others as they are, its poses among them."""
+    """Change parts of a venue; the others, such as its poses, stay."""
     patch = parse_patch(changes)
     with open_client(url, api_key) as client:
         print_answer(client.patch_venue(venue, patch), as_json=as_json)
@@ -197,7 +197,7 @@ def venue_poses(
 @app.command("stitch")
 def venue_stitch(
     venue: VenueId,
-    form: Annotated[StitchFormat, typer.Option("--format", help="What stitches with it.")] = "ffmpeg",
+    form: Annotated[StitchFormat, typer.Option("--format", help="Program that stitches with it.")] = "ffmpeg",
     projection: ProjectionOption = None,
     width: Annotated[int | None, typer.Option("--width", help="In pixels, even.")] = None,
     height: Height = None,
@@ -206,14 +206,14 @@ def venue_stitch(
     horizon: Horizon = None,
     output: Output = None,
     if_changed: Annotated[
-        bool, typer.Option("--if-changed", help="Fetch it only if the file of -o is out of date.")
+        bool, typer.Option("--if-changed", help="Fetch the zip only if the file of -o is out of date.")
     ] = False,
     url: Url = DEFAULT_URL,
     api_key: ApiKey = None,
 ) -> None:
     """Write the zip with which ffmpeg, compositors or OpenCV stitch: maps, weights and lights of each camera.
 
-    What is not said of the view is as the venue has it, see `view` of esc venue get.
+    Options that are left out are those of the venue, `view` in `esc venue get`.
     """
     if if_changed and output is None:
         fail("--if-changed needs -o FILE, the zip that may still be up to date", USAGE)
@@ -249,7 +249,7 @@ def restore_venue(
     url: Url = DEFAULT_URL,
     api_key: ApiKey = None,
 ) -> None:
-    """Put the poses of a revision to use again, see `esc venue history`."""
+    """Restore the poses of a revision of `esc venue history`."""
     with open_client(url, api_key) as client:
         print_answer(client.restore(venue, revision), as_json=as_json)
 

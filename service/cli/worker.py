@@ -19,7 +19,7 @@ def worker(
         str | None,
         typer.Option(
             "--name",
-            help="A name that no other worker has, the same after a restart (ESC_WORKER_NAME) [default: the host's]",
+            help="Name of the worker, unique and the same after a restart (ESC_WORKER_NAME) [default: the host's]",
         ),
     ] = None,
 ) -> None:
