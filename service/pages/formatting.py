@@ -29,20 +29,19 @@ KINDS: dict[JobKind, str] = {
     "find": "Search for cameras",
     "check": "Check of a calibration",
 }
-STEPS = ((60.0, 1.0, "s"), (3600.0, 60.0, "min"), (86400.0, 3600.0, "h"), (float("inf"), 86400.0, "d"))
 # Replacements for details that only speak of requests.
 FOR_PEOPLE: dict[str, str] = {
-    "venue-not-found": "There is no venue of this id: somebody has deleted it, or the address is mistyped.",
-    "job-not-found": "There is no job of this id: somebody has deleted it, or the address is mistyped.",
+    "venue-not-found": "Somebody has deleted it, or the address is mistyped.",
+    "job-not-found": "Somebody has deleted it, or the address is mistyped.",
 }
 OF_PROGRAMS = re.compile(r"\b(GET|PUT|POST|PATCH|DELETE) /")
 
 
 def for_people(problem: Problem) -> str:
-    """Return the detail of a problem without sentences about HTTP requests."""
+    """Return the detail of a problem without sentences about HTTP requests, and without the marks of code."""
     sentences = re.split(r"(?<=[.!?])\s+", problem.detail)
     detail = " ".join(sentence for sentence in sentences if not OF_PROGRAMS.search(sentence))
-    return detail or FOR_PEOPLE.get(problem.kind, "")
+    return detail.replace("`", "") or FOR_PEOPLE.get(problem.kind, "")
 
 
 def figure(value: float | None, unit: str = "", digits: int = 2) -> str:
@@ -84,7 +83,8 @@ def percent(share: float | None) -> str:
 
 def length_change(share: float) -> str:
     """Return a relative change of the focal length in words: `0.12 % shorter`."""
-    return f"{100 * abs(share):.2f} % {'longer' if share >= 0 else 'shorter'}"
+    amount = f"{100 * abs(share):.2f}"
+    return "unchanged" if amount == "0.00" else f"{amount} % {'longer' if share > 0 else 'shorter'}"
 
 
 def capitalised(words: str) -> str:
@@ -93,12 +93,16 @@ def capitalised(words: str) -> str:
 
 
 def ago(moment: datetime, now: datetime | None = None) -> str:
-    """Return the time since a moment: `3 min ago`."""
-    seconds = max(0.0, ((now or datetime.now(UTC)) - moment).total_seconds())
+    """Return the time since a moment: `3 min ago`; to the minute within a day, which many calibrations may have."""
+    seconds = int(((now or datetime.now(UTC)) - moment).total_seconds())
     if seconds < 5:
         return "just now"
-    _, length, unit = next(step for step in STEPS if seconds < step[0])
-    return f"{seconds / length:.0f} {unit} ago"
+    if seconds < 60:
+        return f"{seconds} s ago"
+    hours, minutes = divmod(seconds // 60, 60)
+    if hours >= 24:
+        return f"{hours // 24} d ago"
+    return f"{hours} h {minutes} min ago" if hours else f"{minutes} min ago"
 
 
 def moment(when: datetime) -> str:

@@ -94,9 +94,9 @@ def test_all_reasons_are_listed_for_browsers(stub, kind):
     ("path", "words"),
     [
         ("/nowhere", "Nothing is at /nowhere."),
-        ("/ui/venues/nope", "There is no venue of this id: somebody has deleted it, or the address is mistyped."),
+        ("/ui/venues/nope", "Somebody has deleted it, or the address is mistyped."),
         ("/ui/venues/NO!", "The address is not one of this service's."),
-        ("/ui/jobs/nope", "There is no job of this id: somebody has deleted it, or the address is mistyped."),
+        ("/ui/jobs/nope", "Somebody has deleted it, or the address is mistyped."),
         (
             "/ui/jobs/01KAJ3Q6WZ5T3Y8R0N4M2C7B1D",
             "It was deleted: by somebody, or since it ended more than 400 days ago.",

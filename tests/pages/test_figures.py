@@ -1,6 +1,7 @@
 """Figures of a result as the page writes them; no browser is needed for that."""
 
 import re
+from datetime import UTC, datetime, timedelta
 from typing import get_args
 
 import pytest
@@ -83,3 +84,24 @@ def test_no_place_is_at_minus_nothing():
 
 def test_every_rule_of_an_alarm_has_a_word():
     assert set(formatting.ALARMS) == set(get_args(AlarmRule))
+
+
+@pytest.mark.parametrize(
+    ("seconds", "words"),
+    [
+        (3, "just now"),
+        (59, "59 s ago"),
+        (61, "1 min ago"),
+        (7500, "2 h 5 min ago"),
+        (8400, "2 h 20 min ago"),
+        (86400, "1 d ago"),
+    ],
+)
+def test_calibrations_of_one_day_are_told_apart_by_their_times(seconds, words):
+    now = datetime(2026, 11, 21, 10, tzinfo=UTC)
+    assert formatting.ago(now - timedelta(seconds=seconds), now) == words
+
+
+def test_a_focal_length_that_rounds_to_no_change_is_unchanged():
+    changes = [formatting.length_change(share) for share in (0.00001, -0.0007)]
+    assert changes == ["unchanged", "0.07 % shorter"]

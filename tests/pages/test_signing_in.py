@@ -80,6 +80,7 @@ def test_a_wrong_key_is_told_so(guarded, visit):
     page = visit(guarded[0].url, forgiven=REFUSED)
     sign_in(page, "esc_wrong")
     expect(page.get_by_role("alert")).to_contain_text("The key was not taken")
+    expect(page.get_by_role("alert")).to_contain_text("of another service; esc key list names those of this.")
 
 
 def test_the_cookie_is_out_of_reach_of_scripts_and_other_sites(guarded, visit):

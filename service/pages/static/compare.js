@@ -27,12 +27,16 @@ function onKey(event, slider) {
   speak(slider);
 }
 
+/** The pixels of an image, to be read. */
+function pixelsOf(image) {
+  const context = new OffscreenCanvas(image.naturalWidth, image.naturalHeight).getContext("2d", {willReadFrequently: true});
+  context.drawImage(image, 0, 0);
+  return context;
+}
+
 /** Places along the seam, in pixels of the view, from bottom to top for each pair of cameras. */
 function alongTheSeam(image) {
-  const canvas = new OffscreenCanvas(image.naturalWidth, image.naturalHeight);
-  const context = canvas.getContext("2d", {willReadFrequently: true});
-  context.drawImage(image, 0, 0);
-  const {data, width, height} = context.getImageData(0, 0, canvas.width, canvas.height);
+  const {data, width, height} = pixelsOf(image).getImageData(0, 0, image.naturalWidth, image.naturalHeight);
   const chains = [];
   for (let y = height - 1; y >= 0; y -= 1) {
     for (let x = 0; x < width; x += 1) {
@@ -50,21 +54,26 @@ function quantile(values, share) {
   return [...values].sort((one, other) => one - other)[Math.floor(share * (values.length - 1))];
 }
 
-/** The place of the seam that looks most like a line: bright, on even ground that is like the ground near the cameras. */
-function onALine(image, seam) {
-  const canvas = new OffscreenCanvas(image.naturalWidth, image.naturalHeight);
-  const context = canvas.getContext("2d", {willReadFrequently: true});
-  context.drawImage(image, 0, 0);
+/** How bright the pixels around a place are. */
+function greysAround(context, {x, y}) {
   const side = 2 * WINDOW + 1;
+  const {data} = context.getImageData(x - WINDOW, y - WINDOW, side, side);
+  return Array.from({length: side * side}, (_, at) => Math.min(data[4 * at], data[4 * at + 1], data[4 * at + 2]));
+}
+
+/** The place of the seam where the new poses have moved most what looks like a line: bright, on even ground that is like
+ * the ground near the cameras. */
+function onALine(before, after, seam) {
+  const [stored, found] = [before, after].map(pixelsOf);
   const places = seam.map(({x, y}, number) => ({x, y, number})).filter(({number}) => number % EACH === 0);
   for (const place of places) {
-    const {data} = context.getImageData(place.x - WINDOW, place.y - WINDOW, side, side);
-    const greys = Array.from({length: side * side}, (_, at) => Math.min(data[4 * at], data[4 * at + 1], data[4 * at + 2]));
+    const [then, greys] = [stored, found].map((context) => greysAround(context, place));
+    const differences = greys.map((grey, at) => Math.abs(grey - then[at]));
     place.ground = quantile(greys, 0.5);
-    place.like = (quantile(greys, 0.97) - place.ground) / (EVEN + quantile(greys, 0.75) - quantile(greys, 0.25));
+    place.like = ((quantile(greys, 0.97) - place.ground) * quantile(differences, 0.97)) / (EVEN + quantile(greys, 0.75) - quantile(greys, 0.25));
   }
   // Places outside the field are high up in the view.
-  const below = places.filter(({y}) => y > image.naturalHeight / 2).map(({ground}) => ground);
+  const below = places.filter(({y}) => y > after.naturalHeight / 2).map(({ground}) => ground);
   const usual = quantile(below.length ? below : places.map(({ground}) => ground), 0.5);
   const onTheField = places.filter(({ground}) => Math.abs(ground - usual) < ALIKE * usual);
   const best = onTheField.reduce((most, one) => (one.like > (most?.like ?? 0) ? one : most), null);
@@ -83,7 +92,7 @@ class Loupe {
     this.seam = alongTheSeam(seam);
     this.place = {x: after.naturalWidth / 2, y: after.naturalHeight / 2};
     this.range.disabled = this.seam.length === 0;
-    if (this.seam.length > 1) this.range.value = Math.round((1000 * onALine(after, this.seam)) / (this.seam.length - 1));
+    if (this.seam.length > 1) this.range.value = Math.round((1000 * onALine(before, after, this.seam)) / (this.seam.length - 1));
     box.hidden = this.reticle.hidden = false;
     this.range.addEventListener("input", () => this.follow());
     this.times.addEventListener("change", () => this.draw());

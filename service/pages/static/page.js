@@ -47,6 +47,12 @@ export function asLabelled(form, message) {
   return words;
 }
 
+/** Show words where they belong; without any, hide the place. */
+export function complain(place, text) {
+  place.textContent = text || "";
+  place.hidden = !text;
+}
+
 /** Headers of requests that change something: the CSRF token of the session. */
 export const signed = token ? {"X-CSRF-Token": token} : {};
 
@@ -85,10 +91,13 @@ export function onScheme(draw, signal) {
 }
 
 export function ago(moment, now = Date.now()) {
-  const seconds = Math.max(0, (now - moment) / 1000);
+  const seconds = Math.trunc((now - moment) / 1000);
   if (seconds < 5) return "just now";
-  const [, length, unit] = [[60, 1, "s"], [3600, 60, "min"], [86400, 3600, "h"], [Infinity, 86400, "d"]].find(([end]) => seconds < end);
-  return `${Math.round(seconds / length)} ${unit} ago`;
+  if (seconds < 60) return `${seconds} s ago`;
+  const minutes = Math.floor(seconds / 60);
+  const hours = Math.floor(minutes / 60);
+  if (hours >= 24) return `${Math.floor(hours / 24)} d ago`;
+  return hours ? `${hours} h ${minutes % 60} min ago` : `${minutes} min ago`;
 }
 
 /** A moment in the viewer's time zone: 2026-11-21 11:00:09 GMT+1. */
