@@ -1,8 +1,9 @@
 // A new venue by hand, with clicked first poses. Its data stay in the browser until the venue is created.
 
+import {complain} from "./page.js";
 import {missingOfPitch, pitch, pitchForm, readForm} from "./pitch.js";
 import {Camera, common} from "./posing.js";
-import {createAndCalibrate} from "./steps.js";
+import {createAndCalibrate, showMissing} from "./steps.js";
 
 const createButton = document.getElementById("create");
 const missing = document.getElementById("missing");
@@ -26,8 +27,7 @@ function tell() {
     else if (!camera.file) open.push(`a frame of ${camera.id}`);
     else if (!camera.result) open.push(`the first pose of ${camera.id}`);
   }
-  createButton.disabled = open.length > 0;
-  missing.textContent = open.length ? `Still missing: ${open.join("; ")}.` : "";
+  showMissing(open, missing, createButton);
 }
 
 async function create() {
@@ -39,8 +39,7 @@ async function create() {
     const frames = cameras.map((camera) => [camera.id, camera.file]);
     await createAndCalibrate(venue, frames, () => { missing.textContent = "Sending the frames …"; });
   } catch (problem) {
-    refused.textContent = problem.message;
-    refused.hidden = false;
+    complain(refused, problem.message);
     tell();
   }
 }

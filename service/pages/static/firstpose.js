@@ -1,6 +1,6 @@
 // New first poses of a stored venue, for the cameras that get a frame.
 
-import {call, root} from "./page.js";
+import {call, complain, root} from "./page.js";
 import {Camera, common} from "./posing.js";
 
 const box = document.getElementById("cameras");
@@ -41,8 +41,7 @@ async function store() {
     await call("PATCH", `${root}/venues/${venue.id}`, {cameras}, {"If-Match": box.dataset.tag});
     location.assign(`${root}/ui/venues/${venue.id}`);
   } catch (refusal) {
-    refused.textContent = refusal.message;
-    refused.hidden = false;
+    complain(refused, refusal.message);
     tell();
   }
 }

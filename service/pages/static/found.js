@@ -1,6 +1,6 @@
 // Result of a search for cameras: choose a candidate of each camera, and store all of them.
 
-import {call, root} from "./page.js";
+import {call, complain, root} from "./page.js";
 
 const form = document.getElementById("found");
 const button = form?.querySelector("button[type=submit]");
@@ -44,8 +44,7 @@ async function take(event) {
   try {
     await call("POST", `${root}/venues/${form.dataset.venue}/adopt-found`, {job: form.dataset.job, candidates});
   } catch (problem) {
-    refused.textContent = problem.message;
-    refused.hidden = false;
+    complain(refused, problem.message);
     return tell();
   }
   if (!("calibrates" in form.dataset)) return location.assign(venue);

@@ -1,7 +1,7 @@
 // Forms that upload frames of all or some cameras, with checks before and progress during the upload.
 
-import {root, signed} from "./page.js";
-import {objection, thumbnail} from "./frames.js";
+import {complain, root, signed} from "./page.js";
+import {objection, onFiles, removeButton, thumbnail} from "./frames.js";
 
 const form = document.getElementById("send-frames");
 const button = form.querySelector("button[type=submit]");
@@ -16,7 +16,6 @@ class Drop {
     this.size = [Number(box.dataset.width), Number(box.dataset.height)];
     this.files = [];
     this.input = box.querySelector("input[type=file]");
-    this.input.addEventListener("change", () => this.take());
     box.addEventListener("dragover", (event) => { event.preventDefault(); box.classList.add("over"); });
     box.addEventListener("dragleave", () => box.classList.remove("over"));
     box.addEventListener("drop", (event) => {
@@ -25,13 +24,6 @@ class Drop {
       box.classList.remove("over");
       this.add([...event.dataTransfer.files]);
     });
-  }
-
-  /** Take the files that the input has by now: on a slow connection they are chosen before this script is loaded. */
-  take() {
-    if (this.input.files.length === 0) return;
-    this.add([...this.input.files]);
-    this.input.value = "";
   }
 
   async add(files) {
@@ -46,20 +38,13 @@ class Drop {
         await this.show(file);
       }
     }
-    const place = this.box.querySelector(".wrong");
-    place.textContent = complaints.join(" ");
-    place.hidden = complaints.length === 0;
+    complain(this.box.querySelector(".wrong"), complaints.join(" "));
     tell();
   }
 
   async show(file) {
     const item = document.createElement("li");
-    const remove = document.createElement("button");
-    remove.type = "button";
-    remove.className = "quiet small-button";
-    remove.textContent = "Remove";
-    remove.setAttribute("aria-label", `Remove ${file.name}`);
-    remove.addEventListener("click", () => {
+    const remove = removeButton(file.name, () => {
       this.files = this.files.filter((one) => one !== file);
       item.remove();
       this.input.focus();
@@ -74,7 +59,7 @@ class Drop {
 }
 
 const drops = [...form.querySelectorAll(".drop")].map((box) => new Drop(box));
-for (const drop of drops) drop.take();
+for (const drop of drops) onFiles(drop.input, (files) => drop.add(files));
 
 /** Returns the cameras that still need a frame. */
 function tell() {
@@ -96,8 +81,7 @@ function options() {
 }
 
 function refuse(problem) {
-  refused.textContent = problem.detail || problem.title || "The service did not take the frames.";
-  refused.hidden = false;
+  complain(refused, problem.detail || problem.title || "The service did not take the frames.");
   bar.hidden = true;
   tell();
 }

@@ -42,6 +42,25 @@ function* exifOfPng(view) {
   }
 }
 
+/** Take the files of an input, also those that on a slow connection were chosen before this script was loaded. */
+export function onFiles(input, add) {
+  const take = () => {
+    if (input.files.length === 0) return;
+    add([...input.files]);
+    input.value = "";
+  };
+  input.addEventListener("change", take);
+  take();
+}
+
+/** A button that removes what `name` says. */
+export function removeButton(name, remove) {
+  const button = document.createElement("button");
+  Object.assign(button, {type: "button", className: "quiet small-button", textContent: "Remove", ariaLabel: `Remove ${name}`});
+  button.addEventListener("click", remove);
+  return button;
+}
+
 /** Width and height of the stored pixels of a picture. */
 export async function sizeOf(file) {
   const picture = await pictureOf(file);

@@ -1,9 +1,9 @@
 // Ignored areas of each camera's frame: drawn corner by corner, saved with the venue.
 
-import {pictureOf} from "./frames.js";
+import {pictureOf, removeButton} from "./frames.js";
 import {call, root} from "./page.js";
+import {drawn, pixelAt, stepped} from "./sighting.js";
 
-const SVG = "http://www.w3.org/2000/svg";
 const WIDEST = 1920;
 /** Distance from the first corner, in screen pixels, within which a click closes an area. */
 const CLOSING = 12;
@@ -26,7 +26,7 @@ class Areas {
     this.svg.setAttribute("viewBox", `-0.5 -0.5 ${this.size[0]} ${this.size[1]}`);
     this.canvas.width = Math.min(this.size[0], WIDEST);
     this.canvas.height = Math.round((this.size[1] * this.canvas.width) / this.size[0]);
-    this.sighting.addEventListener("click", (event) => this.set(this.pixel(event)));
+    this.sighting.addEventListener("click", (event) => this.set(pixelAt(event, this.canvas, this.size)));
     this.sighting.addEventListener("keydown", (event) => this.onKey(event));
     box.querySelector("input[type=file]").addEventListener("change", (event) => this.show(event.target.files[0]));
     if (box.dataset.address) this.fetch(box.dataset.address);
@@ -53,13 +53,6 @@ class Areas {
 
   say(words) { this.box.querySelector("[data-said]").textContent = words; }
 
-  /** Position in the frame, whose pixel centres are at integers. */
-  pixel(event) {
-    const rect = this.canvas.getBoundingClientRect();
-    const place = (value, start, extent, size) => ((value - start) / extent) * size - 0.5;
-    return [place(event.clientX, rect.left, rect.width, this.size[0]), place(event.clientY, rect.top, rect.height, this.size[1])];
-  }
-
   set(pixel) {
     const scale = this.canvas.getBoundingClientRect().width / this.size[0];
     const [first] = this.open;
@@ -83,45 +76,32 @@ class Areas {
   }
 
   onKey(event) {
-    const steps = {ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1]};
+    const moved = stepped(this.cross, event, 5, this.size);
     if (event.key === " ") this.set(this.cross);
     else if (event.key === "Enter") this.close();
     else if (event.key === "Backspace") this.open.pop();
     else if (event.key === "Escape") this.open = [];
-    else if (event.key in steps) {
-      const far = event.shiftKey ? 50 : 5;
-      this.cross = this.cross.map((value, axis) => Math.min(this.size[axis] - 1, Math.max(0, value + far * steps[event.key][axis])));
-    } else return;
+    else if (moved) this.cross = moved;
+    else return;
     event.preventDefault();
     this.draw();
   }
 
   draw() {
     this.svg.replaceChildren();
-    for (const area of this.areas) this.shape("polygon", {class: "area", points: area.map((corner) => corner.join(",")).join(" ")});
-    if (this.open.length) this.shape("polyline", {class: "area open", points: this.open.map((corner) => corner.join(",")).join(" ")});
+    for (const area of this.areas) drawn("polygon", {class: "area", points: area.map((corner) => corner.join(",")).join(" ")}, this.svg);
+    if (this.open.length) drawn("polyline", {class: "area open", points: this.open.map((corner) => corner.join(",")).join(" ")}, this.svg);
     const unit = this.size[0] / 250;
-    for (const [x, y] of this.open) this.shape("circle", {class: "corner", cx: x, cy: y, r: unit});
+    for (const [x, y] of this.open) drawn("circle", {class: "corner", cx: x, cy: y, r: unit}, this.svg);
     const [x, y] = this.cross;
-    this.shape("path", {class: "cross", d: `M${x - 3 * unit} ${y}h${6 * unit}M${x} ${y - 3 * unit}v${6 * unit}`});
+    drawn("path", {class: "cross", d: `M${x - 3 * unit} ${y}h${6 * unit}M${x} ${y - 3 * unit}v${6 * unit}`}, this.svg);
     this.list();
-  }
-
-  shape(name, attributes) {
-    const element = document.createElementNS(SVG, name);
-    for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
-    this.svg.append(element);
   }
 
   list() {
     const items = this.areas.map((area, number) => {
       const item = document.createElement("li");
-      const remove = document.createElement("button");
-      remove.type = "button";
-      remove.className = "quiet small-button";
-      remove.textContent = "Remove";
-      remove.setAttribute("aria-label", `Remove area ${number + 1} of camera ${this.camera}`);
-      remove.addEventListener("click", () => {
+      const remove = removeButton(`area ${number + 1} of camera ${this.camera}`, () => {
         this.areas = this.areas.filter((one) => one !== area);
         this.changed();
       });

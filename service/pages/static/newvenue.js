@@ -1,10 +1,10 @@
 // A new venue by its sport and a frame of each camera: submits a search for the cameras, or creates it with the poses of
 // a calibration that another tool has made.
 
-import {call, root} from "./page.js";
-import {objection, sizeOf, thumbnail} from "./frames.js";
+import {call, complain, root} from "./page.js";
+import {objection, onFiles, sizeOf, thumbnail} from "./frames.js";
 import {missingOfPitch, pitch, pitchForm, readForm} from "./pitch.js";
-import {complain, createAndCalibrate, idLike, number} from "./steps.js";
+import {createAndCalibrate, idLike, number, showMissing} from "./steps.js";
 
 const box = document.getElementById("frames");
 const list = box.querySelector("ul");
@@ -88,8 +88,7 @@ function tell() {
   if (new Set(cameras.map((camera) => camera.id)).size < cameras.length) open.push("cameras of different names");
   const unknown = calibration ? cameras.filter((camera) => !calibrated(camera)) : [];
   if (unknown.length) open.push(`an id of the calibration (${calibration.cameras.map((camera) => camera.id).join(", ")}) for ${unknown.map((camera) => camera.file.name).join(", ")}`);
-  button.disabled = open.length > 0;
-  missing.textContent = open.length ? `Still missing: ${open.join("; ")}.` : "";
+  showMissing(open, missing, button);
 }
 
 /** The camera of the calibration that a frame is of; the only one of a file has any name. */
@@ -143,8 +142,7 @@ async function send() {
     if (proposed.value === proposed.defaultValue && proposed.value !== createAndCalibrate.done) proposed.value = proposed.defaultValue = (await call("GET", `${root}/ui/new-venue/free`)).id;
     await (calibration ? create() : find());
   } catch (problem) {
-    refused.textContent = problem.message;
-    refused.hidden = false;
+    complain(refused, problem.message);
     tell();
   }
 }
@@ -169,25 +167,9 @@ function takePlan() {
   document.getElementById("from-plan").hidden = false;
 }
 
-/** Take the files that the input has by now: on a slow connection they are chosen before this script is loaded. */
-function take() {
-  if (input.files.length === 0) return;
-  add([...input.files]);
-  input.value = "";
-}
-
-/** The same for a calibration. */
-function takeFiles() {
-  if (chosenFiles.files.length === 0) return;
-  readCalibration([...chosenFiles.files]);
-  chosenFiles.value = "";
-}
-
-input.addEventListener("change", take);
 takePlan();
-take();
-chosenFiles.addEventListener("change", takeFiles);
-takeFiles();
+onFiles(input, add);
+onFiles(chosenFiles, readCalibration);
 without.addEventListener("click", () => takeCalibration(null));
 document.addEventListener("dragover", (event) => event.preventDefault());
 document.addEventListener("drop", (event) => {

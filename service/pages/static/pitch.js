@@ -1,7 +1,7 @@
 // The pitch of a new venue: its id, sport and dimensions, checked while typing.
 
-import {asLabelled, call, root} from "./page.js";
-import {complain, drawPlan, later, number} from "./steps.js";
+import {asLabelled, call, complain, root} from "./page.js";
+import {drawPlan, later, number} from "./steps.js";
 
 export const pitchForm = document.getElementById("pitch");
 

@@ -1,9 +1,9 @@
 // A plan of cameras before they are mounted: the form, and the answer as tables and maps.
 
-import {call, root} from "./page.js";
+import {call, complain, root} from "./page.js";
 import {pitch, pitchForm, readForm} from "./pitch.js";
 import {drawn} from "./sighting.js";
-import {complain, number} from "./steps.js";
+import {number, showMissing} from "./steps.js";
 
 const list = document.querySelector(".planned");
 const makeButton = document.getElementById("make");
@@ -20,7 +20,7 @@ let answer = null;
 
 const cm = (metres) => `${(100 * metres).toFixed(1)} cm`;
 const percent = (share) => `${(100 * share).toFixed(share > 0.99 && share < 1 ? 1 : 0)} %`;
-const change = ({before_m: before, after_m: after}) => `${(100 * before).toFixed(1)} → ${cm(after)}`;
+const change = ({before_m: before, after_m: after}) => `${after < before ? "−" : "+"}${cm(Math.abs(after - before))}`;
 
 /** A camera as it is typed in. `side`: -1 looks to the left half, 1 to the right half. */
 class PlannedCamera {
@@ -76,8 +76,7 @@ function tell() {
   if (!cameras.length) open.push("a camera");
   if (!cameras.every((camera) => camera.isComplete)) open.push("an id and all numbers of each camera");
   if (new Set(cameras.map((camera) => camera.id)).size < cameras.length) open.push("cameras of different names");
-  makeButton.disabled = open.length > 0;
-  missing.textContent = open.length ? `Still missing: ${open.join("; ")}.` : "";
+  showMissing(open, missing, makeButton);
   drawCameras();
 }
 

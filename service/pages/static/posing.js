@@ -1,9 +1,9 @@
 // Cameras whose first pose is found from points of the pitch that are clicked in a frame.
 
-import {call, Refused, root} from "./page.js";
-import {objection, sizeOf} from "./frames.js";
+import {call, complain, Refused, root} from "./page.js";
+import {objection, removeButton, sizeOf} from "./frames.js";
 import {drawn, Sighting} from "./sighting.js";
-import {complain, drawPlan, later, number} from "./steps.js";
+import {drawPlan, later, number} from "./steps.js";
 
 const FEWEST = 4;
 const PAUSE = 250;
@@ -258,12 +258,7 @@ export class Camera {
       const row = document.createElement("tr");
       const at = this.answer ? this.answer.asked.findIndex((point) => point.name === name) : -1;
       const point = at >= 0 && this.answer.result ? this.answer.result.points[at] : null;
-      const remove = document.createElement("button");
-      remove.type = "button";
-      remove.className = "quiet small-button";
-      remove.textContent = "Remove";
-      remove.setAttribute("aria-label", `Remove ${name}`);
-      remove.addEventListener("click", () => this.drop(name));
+      const remove = removeButton(name, () => this.drop(name));
       for (const content of [name, residual(point), remove]) row.insertCell().append(content);
       row.cells[1].className = "num";
       row.classList.toggle("doubted", Boolean(point && point.doubted));

@@ -1,6 +1,6 @@
 // The schedule of a venue: saving it with the sources that it needs, and trying it.
 
-import {call, root, say} from "./page.js";
+import {call, complain, root, say} from "./page.js";
 import {whenShown} from "./parts.js";
 
 /** The changes of the venue by the form; options of the schedule are kept. */
@@ -20,8 +20,7 @@ async function save(event, refused) {
     await call("PATCH", `${root}/venues/${form.dataset.venue}`, patch(form));
     location.reload();
   } catch (refusal) {
-    refused.textContent = refusal.message;
-    refused.hidden = false;
+    complain(refused, refusal.message);
   }
 }
 

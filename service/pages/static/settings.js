@@ -1,6 +1,6 @@
 // The settings of a venue: name and field, alarms, lenses, and deletion. Each form is saved alone, if the venue is unchanged.
 
-import {ask, asLabelled, call, root} from "./page.js";
+import {ask, asLabelled, call, complain, root} from "./page.js";
 
 const box = document.getElementById("settings");
 const address = `${root}/venues/${box.dataset.venue}`;
@@ -16,8 +16,7 @@ function onSubmit(form, act) {
     try {
       await act();
     } catch (refusal) {
-      refused.textContent = asLabelled(form, refusal.message);
-      refused.hidden = false;
+      complain(refused, asLabelled(form, refusal.message));
     }
   });
 }

@@ -13,6 +13,19 @@ export function drawn(name, attributes, inside) {
   return element;
 }
 
+/** Position of the pointer in a frame of this size, whose pixel centres are at integers. */
+export function pixelAt({clientX, clientY}, canvas, [width, height]) {
+  const rect = canvas.getBoundingClientRect();
+  return [((clientX - rect.left) / rect.width) * width - 0.5, ((clientY - rect.top) / rect.height) * height - 0.5];
+}
+
+/** The place to which an arrow key moves the cross, `near` pixels away or with Shift 50; null for another key. */
+export function stepped(cross, {key, shiftKey}, near, size) {
+  const step = {ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1]}[key];
+  const by = shiftKey ? 50 : near;
+  return step ? cross.map((value, axis) => Math.min(size[axis] - 1, Math.max(0, value + by * step[axis]))) : null;
+}
+
 /** The frame with its clicked points, the field projected by the pose, a loupe, and a cursor for the keyboard. */
 export class Sighting {
   constructor(camera) {
@@ -39,12 +52,10 @@ export class Sighting {
     this.unit = width / 400;
   }
 
-  /** Position in the frame, whose pixel centres are at integers. */
-  pixel(event) {
-    const rect = this.canvas.getBoundingClientRect();
-    const place = (value, start, extent, size) => Math.round(10 * (((value - start) / extent) * size - 0.5)) / 10;
-    return [place(event.clientX, rect.left, rect.width, this.bitmap.width), place(event.clientY, rect.top, rect.height, this.bitmap.height)];
-  }
+  get size() { return [this.bitmap.width, this.bitmap.height]; }
+
+  /** Position of the pointer in the frame, to a tenth of a pixel. */
+  pixel(event) { return pixelAt(event, this.canvas, this.size).map((value) => Math.round(10 * value) / 10); }
 
   aim([x, y]) {
     this.cross = [x, y];
@@ -67,13 +78,10 @@ export class Sighting {
   }
 
   onKey(event) {
-    const steps = {ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1]};
+    const moved = stepped(this.cross, event, 1, this.size);
     if (event.key === "Enter") this.camera.set(this.cross.map((value) => Math.round(value * 10) / 10));
-    else if (event.key in steps) {
-      const far = event.shiftKey ? 50 : 1;
-      const last = [this.bitmap.width - 1, this.bitmap.height - 1];
-      this.aim(this.cross.map((value, axis) => Math.min(last[axis], Math.max(0, value + far * steps[event.key][axis]))));
-    } else return;
+    else if (moved) this.aim(moved);
+    else return;
     event.preventDefault();
   }
 

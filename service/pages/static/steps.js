@@ -5,9 +5,10 @@ import {drawn} from "./sighting.js";
 
 const PAUSE = 250;
 
-export function complain(place, text) {
-  place.textContent = text || "";
-  place.hidden = !text;
+/** Name the steps that are still missing; without any, the button can be pressed. */
+export function showMissing(steps, place, button) {
+  place.textContent = steps.length ? `Still missing: ${steps.join("; ")}.` : "";
+  button.disabled = steps.length > 0;
 }
 
 export function number(text) {

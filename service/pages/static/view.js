@@ -1,6 +1,6 @@
 // The stitched view of a venue: its controls, a preview with the last frames, and packages for other tools.
 
-import {call, root} from "./page.js";
+import {call, complain, root} from "./page.js";
 import {whenShown} from "./parts.js";
 
 const PAUSE = 250;
@@ -43,11 +43,6 @@ class View {
     return new URLSearchParams(parts);
   }
 
-  refuse(text) {
-    this.refused.textContent = text;
-    this.refused.hidden = !text;
-  }
-
   /** Show the view; if it changes meanwhile, show the new one next. */
   async draw() {
     const {picture} = this;
@@ -63,9 +58,9 @@ class View {
         picture.height = view.height;
         picture.getContext("2d").drawImage(view, 0, 0);
         picture.classList.remove("waiting");
-        this.refuse("");
+        complain(this.refused, "");
       } catch (error) {
-        this.refuse(error.message);
+        complain(this.refused, error.message);
       }
     }
     picture.setAttribute("aria-busy", "false");
@@ -93,7 +88,7 @@ class View {
       await call("PATCH", `${root}/venues/${this.form.dataset.venue}`, {view: this.chosen}, {"If-Match": tag});
       location.reload();
     } catch (refusal) {
-      this.refuse(refusal.message);
+      complain(this.refused, refusal.message);
     }
   }
 }
