@@ -76,6 +76,8 @@ REPORT_S = 5.0
 NOTHING: Mapping[str, Any] = MappingProxyType({})
 OCTETS = "application/octet-stream"
 Answer = TypeVar("Answer", bound=BaseModel)
+# A frame of each camera, or several.
+Frames = Mapping[str, Path | Sequence[Path]]
 
 
 class AsyncClient:
@@ -200,11 +202,7 @@ class AsyncClient:
         return response.content
 
     async def venue_events(
-        self,
-        venue_id: str,
-        kinds: Sequence[EventKind] = (),
-        seen: str | None = None,
-        patience_s: float = math.inf,
+        self, venue_id: str, kinds: Sequence[EventKind] = (), seen: str | None = None, patience_s: float = math.inf
     ) -> AsyncGenerator[tuple[str, Event]]:
         """Yield the events of a venue (of these kinds, absent: of any), each with its id, for `seen`.
 
@@ -262,11 +260,7 @@ class AsyncClient:
     # Jobs
 
     async def calibrate(
-        self,
-        venue_id: str,
-        files: Mapping[str, Path | Sequence[Path]],
-        options: Mapping[str, Any],
-        idempotency_key: str | None = None,
+        self, venue_id: str, files: Frames, options: Mapping[str, Any], idempotency_key: str | None = None
     ) -> Job:
         """Submit a frame of each camera, or several, or none: then they are fetched.
 
@@ -276,11 +270,7 @@ class AsyncClient:
         return await self._call(Job, "POST", f"/venues/{venue_id}/calibrate", **sent)
 
     async def fit_field(
-        self,
-        venue_id: str,
-        files: Mapping[str, Path | Sequence[Path]],
-        options: Mapping[str, Any],
-        idempotency_key: str | None = None,
+        self, venue_id: str, files: Frames, options: Mapping[str, Any], idempotency_key: str | None = None
     ) -> Job:
         """Submit frames by which to fit the measures of a venue's pitch; the venue stays as it is."""
         sent = _upload(files, options, idempotency_key)
@@ -289,7 +279,7 @@ class AsyncClient:
     async def find(
         self,
         venue_id: str,
-        files: Mapping[str, Path | Sequence[Path]],
+        files: Frames,
         options: Mapping[str, Any] = NOTHING,
         site: SoughtSite | None = None,
         idempotency_key: str | None = None,
@@ -305,11 +295,7 @@ class AsyncClient:
         return await self._call(Job, "POST", f"/venues/{venue_id}/find", **sent)
 
     async def check(
-        self,
-        calibration: Sequence[Path],
-        files: Mapping[str, Path | Sequence[Path]],
-        options: Mapping[str, Any],
-        idempotency_key: str | None = None,
+        self, calibration: Sequence[Path], files: Frames, options: Mapping[str, Any], idempotency_key: str | None = None
     ) -> Job:
         """Submit the files of a calibration of any tool, and frames of its cameras; `options` say the field."""
         sent = _upload(files, options, idempotency_key)
@@ -568,9 +554,7 @@ def _export_params(form: FormatName, camera: str | None, lens: LensChoice) -> di
     return {"format": form} | lens_choice | ({"camera": camera} if camera else {})
 
 
-def _upload(
-    files: Mapping[str, Path | Sequence[Path]], options: Mapping[str, Any], idempotency_key: str | None
-) -> dict[str, Any]:
+def _upload(files: Frames, options: Mapping[str, Any], idempotency_key: str | None) -> dict[str, Any]:
     parts: list[tuple[str, tuple[str, bytes, str]]] = [
         (camera, (path.name, path.read_bytes(), OCTETS))
         for camera, paths in files.items()

@@ -67,26 +67,12 @@ def _submit(context: Context, venue: Venue, camera_id: str, form: FormData, send
 
 def _frame(camera: Camera, form: FormData) -> list[UploadFile]:
     """Return the frame that was sent, in a list that is empty without one."""
-    frames = []
-    for name, part in form.multi_items():
-        if name == OPTIONS_PART:
-            continue
-        if name != camera.id:
-            raise Problem(
-                "unknown-camera",
-                f"A frame of camera {camera.id} is a part named {camera.id}.",
-                camera=name[:64],
-                expected=[camera.id],
-            )
-        if not isinstance(part, UploadFile):
-            raise Problem("not-a-file", f"Send the frame as a file, with curl: -F {name}=@frame.jpg", camera=name)
-        frames.append(part)
+    files = forms.files_by_camera(form, (OPTIONS_PART,))
+    frames = files.pop(camera.id, [])
+    if files:
+        detail = f"A frame of camera {camera.id} is a part named {camera.id}."
+        raise Problem("unknown-camera", detail, camera=next(iter(files))[:64], expected=[camera.id])
     if len(frames) > 1:
-        raise Problem(
-            "too-many-frames",
-            f"Send the one frame of camera {camera.id} that the points were clicked in.",
-            camera=camera.id,
-            expected=1,
-            got=len(frames),
-        )
+        detail = f"Send the one frame of camera {camera.id} that the points were clicked in."
+        raise Problem("too-many-frames", detail, camera=camera.id, expected=1, got=len(frames))
     return frames
