@@ -30,9 +30,9 @@ def send(service, stadium):
     return send
 
 
-def jpeg(width: int = SIZE[0], height: int = SIZE[1], progressive: bool = False) -> bytes:
-    noise = np.random.default_rng(1).integers(0, 255, (height, width, 3), dtype=np.uint8)
-    return cv2.imencode(".jpg", noise, [cv2.IMWRITE_JPEG_PROGRESSIVE, int(progressive)])[1].tobytes()
+def jpeg() -> bytes:
+    noise = np.random.default_rng(1).integers(0, 255, (SIZE[1], SIZE[0], 3), dtype=np.uint8)
+    return cv2.imencode(".jpg", noise)[1].tobytes()
 
 
 def bomb() -> bytes:
@@ -55,31 +55,20 @@ def jpeg_that_claims(width: int, height: int) -> bytes:
     return data[: frame + 5] + struct.pack(">HH", height, width) + data[frame + 9 :]
 
 
-PDF = b"%PDF-1.7\n1 0 obj<</Type/Catalog>>endobj\ntrailer<</Root 1 0 R>>\n%%EOF"
 SVG = b'<svg xmlns="http://www.w3.org/2000/svg"><script>alert(1)</script></svg>'
 GIF = b"GIF89a" + struct.pack("<HH", *SIZE) + b"\0\0\0;"
 
 HOSTILE = {
     "wrong size": (png(*reversed(SIZE)), "frame-size"),
-    "wrong size as jpeg": (jpeg(*reversed(SIZE)), "frame-size"),
     "no image": (b"once upon a time", "not-an-image"),
-    "a page": (b"<html>404</html>", "not-an-image"),
-    "another format": (b"RIFF\x24\0\0\0WEBPVP8 " + bytes(64), "not-an-image"),
     "nothing": (b"", "empty-frame"),
     "truncated jpeg": (jpeg()[:-200], "truncated-image"),
-    "truncated progressive jpeg": (jpeg(progressive=True)[:-200], "truncated-image"),
-    "jpeg that lost its last two bytes": (jpeg()[:-2], "truncated-image"),
-    "truncated png": (png()[:-20], "truncated-image"),
     "damaged png": (png()[:60] + b"\0\0" + png()[62:], "broken-image"),
     "half a jpeg header": (jpeg()[:30], "broken-image"),
-    "half a png header": (png()[:20], "broken-image"),
     "pixel bomb": (bomb(), "too-many-pixels"),
     "pixel bomb as jpeg": (jpeg_that_claims(65535, 65535), "too-many-pixels"),
     "no pixels": (png_of(struct.pack(">IIBBBBB", 0, 0, 8, 0, 0, 0, 0), zlib.compress(b"")), "broken-image"),
     "no pixels as jpeg": (jpeg_that_claims(0, 0), "broken-image"),
-    "pdf": (PDF, "not-an-image"),
-    "svg": (SVG, "not-an-image"),
-    "gif": (GIF, "not-an-image"),
     "gif that ends as a jpeg": (GIF + jpeg(), "not-an-image"),
     "a page before the picture": (b"<html>" + png(), "not-an-image"),
     "a chunk of two gigabytes": (png()[:33] + struct.pack(">I4s", 2**31 - 1, b"IDAT") + b"x", "truncated-image"),
@@ -97,10 +86,6 @@ def test_a_bad_frame_is_refused_by_the_name_of_its_camera(send, kind):
     assert answer.json()["type"] == f"/problems/{problem}"
     assert answer.json()["camera"] == "left"
     assert "left" in answer.json()["detail"]
-
-
-def test_the_second_camera_is_named_too(send):
-    assert send(png(), right=b"no").json()["camera"] == "right"
 
 
 def test_a_wrong_size_says_what_was_expected_and_what_came(send):
@@ -209,7 +194,7 @@ def test_frames_for_no_venue_are_refused(service):
 
 def test_refused_frames_leave_nothing_behind(service, send):
     before = sorted(service.data.glob("blobs/frames/*"))
-    send(png(), right=b"no")
+    assert send(png(), right=b"no").json()["camera"] == "right"
     assert sorted(service.data.glob("blobs/frames/*")) == before
 
 

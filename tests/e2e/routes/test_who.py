@@ -10,7 +10,6 @@ from service.schemas.venue import VENUE_EXAMPLE, VenueIn
 from service.store.events.feed import EventRepository
 from service.store.venues import VenueRepository
 from testbed.running import Service, keys_in, venue
-from tests.e2e.commands import esc_here
 from tests.e2e.routes.event_stream import Stream
 
 TRUCK, OFFICE = "203.0.113.7", "2001:db8::7"
@@ -103,12 +102,6 @@ def test_where_no_keys_are_asked_for_it_was_anyone(service, name):
     assert put["by"] == {"name": "anyone", "address": "127.0.0.1", "request_id": "van-3"}
     assert service.calibrated(name)["asked_by"] is None
     assert revisions(service, name)[0]["by"]["name"] == "anyone"
-
-
-def test_the_command_prints_who_and_from_where(asking, name, tmp_path):
-    call(asking, "PUT", f"/venues/{name}", "put-1", json=venue(name))
-    run = esc_here(tmp_path, "venue", "history", name, **asking.environment | {"ESC_URL": asking.url})
-    assert run.stdout.splitlines()[0].endswith(f"\tkey truck from {TRUCK}")
 
 
 def test_the_log_line_of_a_request_has_the_address_of_its_client(asking, name):

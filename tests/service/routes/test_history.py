@@ -46,20 +46,6 @@ def test_a_revision_is_restored_if_the_venue_is_the_one_that_was_seen(service, n
     assert service.http.post("/venues/nowhere/restore", json={"revision": 1}).status_code == 404
 
 
-def test_a_rejected_result_is_accepted_by_hand_and_rejected_again(service, name):
-    job = service.calibrated(service.venue(name, "reject"))["id"]
-    unchanged = service.http.get(f"/jobs/{job}").headers["etag"]
-    accepted = service.http.post(f"/jobs/{job}/accept")
-    assert (accepted.status_code, accepted.json()["venue_revision"]) == (200, 2)
-    assert accepted.headers["etag"] != unchanged
-    assert accepted.json()["result"]["accepted"] is False
-    assert positions(service, name) == [-0.875, -0.875]
-    assert service.http.post(f"/jobs/{job}/accept").json() == accepted.json()
-    assert service.http.post(f"/jobs/{job}/reject").status_code == 200
-    assert positions(service, name) == [-1.0, -1.0]
-    assert [r["cause"] for r in history(service, name).json()["revisions"]] == ["restored", "accepted", "put"]
-
-
 def test_a_pose_that_no_client_could_send_fails_its_job_at_once_in_words(service, name):
     job = service.calibrated(service.venue(name, "impossible"))
     assert (job["status"], job["attempt"], job["result"]) == ("failed", 1, None)

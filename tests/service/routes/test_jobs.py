@@ -10,25 +10,6 @@ from testbed.homes import in_both_homes
 from testbed.running import SIZE, png, upload
 
 
-@in_both_homes
-def test_an_accepted_result_moves_the_stored_poses(service, name):
-    tag = service.http.get(f"/venues/{service.venue(name)}").headers["etag"]
-    result = service.calibrated(name)["result"]
-    answer = service.http.get(f"/venues/{name}")
-    assert answer.headers["etag"] != tag
-    assert [c["pose"] for c in answer.json()["cameras"]] == [c["pose"] for c in result["cameras"]]
-
-
-@pytest.mark.parametrize(("behaviour", "options"), [("reject", {}), ("fail", {}), ("accept", {"dry_run": True})])
-def test_any_other_result_leaves_them_untouched(service, name, behaviour, options):
-    service.venue(name, behaviour)
-    before = service.http.get(f"/venues/{name}")
-    job = service.calibrated(name, **options)
-    assert job["status"] == ("failed" if behaviour == "fail" else "succeeded")
-    answer = service.http.get(f"/venues/{name}")
-    assert (answer.json(), answer.headers["etag"]) == (before.json(), before.headers["etag"])
-
-
 def test_of_a_result_that_is_accepted_in_part_that_part_is_stored_and_the_other_by_hand(service, name):
     before = service.http.get(f"/venues/{service.venue(name, 'partly')}").json()["cameras"]
     job = service.calibrated(name)
@@ -163,11 +144,6 @@ def test_jobs_are_listed_newest_first_in_pages_that_go_on_whatever_came_in_betwe
     assert [job["id"] for job in first["jobs"] + rest["jobs"]] == ids[::-1]
     assert rest["next_cursor"] is None
     assert service.http.get("/jobs", params={"venue": name, "status": "failed"}).json()["jobs"] == []
-
-
-def test_a_finished_job_cannot_be_cancelled_any_more(service, name):
-    job = service.calibrated(service.venue(name))
-    assert service.http.post(f"/jobs/{job['id']}/cancel").json() == job
 
 
 @in_both_homes

@@ -46,13 +46,6 @@ def test_a_job_is_given_the_memories_that_the_last_accepted_one_left(stock):
     assert second.taken_at == stock.jobs.get(second.job_id).created_at
 
 
-def test_of_a_partly_accepted_job_only_the_accepted_cameras_remember_it(stock):
-    stock.venue("v")
-    night(stock, 1)
-    night(stock, 2, accepted=["left"])
-    assert remembered(stock) == {"left": 2, "right": 1}
-
-
 @pytest.mark.parametrize("how", [{"accepted": False}, {"dry_run": True}, {"memories": ()}])
 def test_what_moves_no_pose_or_knows_no_memories_leaves_them_as_they_are(stock, how):
     stock.venue("v")

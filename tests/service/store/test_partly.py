@@ -7,7 +7,6 @@ from service.schemas.results import View
 from service.store.statistics.snapshot import read_statistics
 from testbed.homes import in_both_homes
 from testbed.stock import result
-from tests.problems import refused
 from tests.service.store.test_alarms import failed, rings, told, watched
 
 
@@ -45,15 +44,6 @@ def test_only_the_poses_that_are_accepted_are_stored(stock):
 # By hand
 
 
-def test_the_cameras_that_were_rejected_can_be_taken_by_hand(stock):
-    stock.venue("v")
-    job = partly(stock)
-    for _ in range(2):
-        stock.decisions.accept(job)
-    assert standing(stock) == BOTH_MOVED
-    assert [one.cause for one in stock.venues.history("v", None, 9)] == ["accepted", "calibrated", "put"]
-
-
 def test_one_camera_after_the_other_can_be_taken_by_hand(stock):
     stock.venue("v")
     job = stock.calibrated("v", accepted=False)
@@ -69,6 +59,7 @@ def test_to_give_a_job_back_gives_back_what_was_taken_of_it_by_hand_as_well(stoc
     stock.venue("v")
     job = partly(stock)
     stock.decisions.accept(job)
+    assert standing(stock) == BOTH_MOVED
     for _ in range(2):
         stock.decisions.reject(job)
     assert standing(stock) == BEFORE
@@ -76,16 +67,6 @@ def test_to_give_a_job_back_gives_back_what_was_taken_of_it_by_hand_as_well(stoc
     assert (newest.cause, newest.job, newest.restored_from) == ("restored", job, 1)
     stock.decisions.accept(job, ["right"])
     assert standing(stock) == {"left": -1.0, "right": -0.999}
-
-
-def test_the_rest_is_not_taken_once_something_else_has_come(stock):
-    stock.venue("v")
-    job = partly(stock)
-    stock.moved_by_hand("v", -3.0)
-    with refused("venue-moved-on"):
-        stock.decisions.accept(job)
-    stock.venues.restore("v", 2)
-    assert standing(stock) == LEFT_MOVED
 
 
 # What is told
