@@ -104,9 +104,7 @@ def _listen(settings: Settings) -> list[socket.socket]:
 def _listener(host: str, port: int) -> socket.socket:
     try:
         return socket.create_server(
-            (host, port),
-            family=socket.AF_INET6 if ":" in host else socket.AF_INET,
-            backlog=LISTEN_BACKLOG,
+            (host, port), family=socket.AF_INET6 if ":" in host else socket.AF_INET, backlog=LISTEN_BACKLOG
         )
     except OSError as error:
         taken = " Does the service run already? --port chooses another." if error.errno == errno.EADDRINUSE else ""

@@ -120,9 +120,7 @@ class Settings(BaseSettings):
     max_frame_mb: float = Field(48, gt=0, description="Largest size of one frame or photo.")
     max_frame_pixels: int = Field(64_000_000, gt=0, description="Pixels of one frame, checked before it is decoded.")
     max_job_pixels: int = Field(
-        500_000_000,
-        gt=0,
-        description="Pixels of all frames of one job; 500 million are 60 frames of 4K.",
+        500_000_000, gt=0, description="Pixels of all frames of one job; 500 million are 60 frames of 4K."
     )
     job_memory_mb: float = Field(
         6000,
@@ -163,16 +161,14 @@ class Settings(BaseSettings):
         description="Content of X, Y, height, pan, tilt, roll in FreeD packets, such as `y -x z -pan+90 tilt roll`.",
     )
     map_program: list[str] = Field(
-        [sys.executable, "-P", "-m", "worker.programs.stmap"],
-        description="Program of the API that computes ST maps.",
+        [sys.executable, "-P", "-m", "worker.programs.stmap"], description="Program of the API that computes ST maps."
     )
     pose_program: list[str] = Field(
         [sys.executable, "-P", "-m", "worker.programs.clicked_pose"],
         description="Program of the API that finds a first pose while points are clicked.",
     )
     plan_program: list[str] = Field(
-        [sys.executable, "-P", "-m", "worker.programs.plan"],
-        description="Program of the API that plans cameras.",
+        [sys.executable, "-P", "-m", "worker.programs.plan"], description="Program of the API that plans cameras."
     )
 
     # Pictures and stitched views.
@@ -198,9 +194,7 @@ class Settings(BaseSettings):
         description="Name of the worker, unique and best the same after a restart.",
     )
     jobs_at_once: int = Field(
-        1,
-        ge=1,
-        description="Jobs that one worker computes at the same time, besides a search and a first pose.",
+        1, ge=1, description="Jobs that one worker computes at the same time, besides a search and a first pose."
     )
     provider: Literal["cpu", "cuda", "openvino"] = Field(
         "cpu",
@@ -236,9 +230,7 @@ class Settings(BaseSettings):
         description="Days to keep pictures, after the end of their job; those of a venue's last accepted job stay.",
     )
     keep_jobs_days: float = Field(
-        400,
-        ge=2,
-        description="Days to keep jobs and their idempotency keys; the last accepted job of a venue stays.",
+        400, ge=2, description="Days to keep jobs and their idempotency keys; the last accepted job of a venue stays."
     )
     keep_revisions_years: float = Field(
         5,
@@ -258,9 +250,7 @@ class Settings(BaseSettings):
         "may name its file.",
     )
     callback_expires_days: float = Field(
-        2,
-        ge=1,
-        description="Age at which undelivered callbacks are given up, however often they were tried.",
+        2, ge=1, description="Age at which undelivered callbacks are given up, however often they were tried."
     )
     callback_allow_http: bool = Field(False, description="Allow callbacks to `http` addresses, too.")
     callback_allow_private: bool = Field(

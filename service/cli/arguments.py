@@ -116,8 +116,7 @@ Port = Annotated[
     int | None, typer.Option("--port", help="Port to listen on; 0 takes a free one (ESC_PORT) [default: 8000]")
 ]
 VenueId = Annotated[
-    str,
-    typer.Argument(metavar="VENUE", callback=check_id, help="Id of a venue, as `esc venue list` prints it."),
+    str, typer.Argument(metavar="VENUE", callback=check_id, help="Id of a venue, as `esc venue list` prints it.")
 ]
 JobId = Annotated[
     str, typer.Argument(metavar="JOB", callback=check_job_id, help="Id of a job, as `esc job list` prints it.")

@@ -176,11 +176,7 @@ def job_poses(
 
 @app.command("accept")
 def accept_job(
-    job: JobId,
-    camera: OneCamera = None,
-    as_json: AnswerAsJson = False,
-    url: Url = DEFAULT_URL,
-    api_key: ApiKey = None,
+    job: JobId, camera: OneCamera = None, as_json: AnswerAsJson = False, url: Url = DEFAULT_URL, api_key: ApiKey = None
 ) -> None:
     """Store the poses of a job that the gate rejected or that was a dry run; confirm those of an accepted one."""
     with open_client(url, api_key) as client:

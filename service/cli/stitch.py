@@ -94,8 +94,7 @@ def stitch(
         typer.Option("--seam", help="Seams stay where they are, or go around people, whom one camera shows whole."),
     ] = "static",
     follow: Annotated[
-        bool,
-        typer.Option("--follow", help="Cameras shake: find where each is in every picture, by its lines."),
+        bool, typer.Option("--follow", help="Cameras shake: find where each is in every picture, by its lines.")
     ] = False,
     follow_every: Annotated[
         int, typer.Option("--follow-every", min=1, max=25, metavar="N", help="Measure in every Nth picture only.")

@@ -56,8 +56,7 @@ AdoptedFinding = Annotated[
     ),
 ]
 CalibrateFound = Annotated[
-    bool,
-    typer.Option("--calibrate", help="With --found: then calibrate the venue with the frames of that job."),
+    bool, typer.Option("--calibrate", help="With --found: then calibrate the venue with the frames of that job.")
 ]
 Candidates = Annotated[
     list[str] | None,

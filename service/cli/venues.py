@@ -166,12 +166,7 @@ def list_venues(as_json: AsJson = False, url: Url = DEFAULT_URL, api_key: ApiKey
 
 
 @app.command("delete")
-def delete_venue(
-    venue: VenueId,
-    yes: Yes = False,
-    url: Url = DEFAULT_URL,
-    api_key: ApiKey = None,
-) -> None:
+def delete_venue(venue: VenueId, yes: Yes = False, url: Url = DEFAULT_URL, api_key: ApiKey = None) -> None:
     """Forget a venue and the history of its poses. Its jobs stay, with frames and pictures, see `esc job delete`."""
     require_yes(yes, f"Forget venue {venue} and the history of its poses")
     with open_client(url, api_key) as client:

@@ -17,16 +17,7 @@ from service.schemas.problems import Problem
 ZIP_START = b"PK\x03\x04"
 MOST_FILES = 1000
 # Suffixes of the files of the formats; of a folder, others are pictures and the like.
-SUFFIXES = {
-    ".json",
-    ".yml",
-    ".yaml",
-    ".xml",
-    ".toml",
-    ".txt",
-    ".bin",
-    ".cameramodel",
-}
+SUFFIXES = {".json", ".yml", ".yaml", ".xml", ".toml", ".txt", ".bin", ".cameramodel"}
 
 
 @dataclass(frozen=True)

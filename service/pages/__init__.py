@@ -2,16 +2,7 @@
 
 from fastapi import APIRouter
 
-from service.pages import (
-    assets,
-    jobs,
-    live,
-    new_venue,
-    problem_pages,
-    signin,
-    venue_forms,
-    venues,
-)
+from service.pages import assets, jobs, live, new_venue, problem_pages, signin, venue_forms, venues
 
 # Included before the routes of the interface: at the same paths, for browsers alone.
 FOR_BROWSERS: APIRouter = problem_pages.router

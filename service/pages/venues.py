@@ -75,12 +75,7 @@ def venues(
         found = context.venues.page(after, PER_PAGE, only)
         rows = venue_rows(context, found.venues)
     return render_page(
-        request,
-        "venues.html",
-        rows=rows,
-        unreadable=found.unreadable,
-        after=found.next_cursor,
-        first=not after,
+        request, "venues.html", rows=rows, unreadable=found.unreadable, after=found.next_cursor, first=not after
     )
 
 

@@ -104,12 +104,7 @@ def list_jobs(
     return shown
 
 
-@router.get(
-    "/{job_id}",
-    openapi_extra=needs_scope("read"),
-    response_model=Job,
-    responses=TAGGED,
-)
+@router.get("/{job_id}", openapi_extra=needs_scope("read"), response_model=Job, responses=TAGGED)
 async def get_job(
     job: ExistingJob,
     context: InContext,
@@ -235,10 +230,7 @@ async def stream_job_events(job: ExistingJob, context: InContext) -> AsyncIterab
     responses=DOCUMENTS | problem_responses("poses-not-found", *OF_EXPORTS),
 )
 def export_job_poses(
-    job: ExistingJob,
-    context: InContext,
-    wanted: Annotated[ExportQuery, Depends()],
-    form: FormatQuery = "json",
+    job: ExistingJob, context: InContext, wanted: Annotated[ExportQuery, Depends()], form: FormatQuery = "json"
 ) -> Response:
     """Export the poses that a job found, accepted or not, to another tool's format."""
     venue = context.jobs.posed(job.id)

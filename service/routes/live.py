@@ -27,12 +27,7 @@ EVENT = "live"
 LONGEST_WAIT_S = 5
 
 
-@router.put(
-    "",
-    status_code=204,
-    openapi_extra=needs_scope("calibrate"),
-    responses=problem_responses("unknown-camera"),
-)
+@router.put("", status_code=204, openapi_extra=needs_scope("calibrate"), responses=problem_responses("unknown-camera"))
 def report_live_poses(venue_id: VenueIdPath, report: LiveReport, context: InContext) -> None:
     """Report how the live poses of a venue are doing; `esc live` does so twice a second.
 
@@ -52,10 +47,7 @@ def get_live_state(venue: ExistingVenue, context: InContext) -> LiveState:
 
 
 @router.get(
-    "/poses",
-    openapi_extra=needs_scope("read"),
-    response_class=EventSourceResponse,
-    dependencies=[FOLLOWER_SLOT],
+    "/poses", openapi_extra=needs_scope("read"), response_class=EventSourceResponse, dependencies=[FOLLOWER_SLOT]
 )
 async def stream_live_poses(venue: ExistingVenue, context: InContext) -> AsyncIterable[ServerSentEvent]:
     """Stream the newest report of a venue's live poses as server-sent events named `live`, at most twice a second.

@@ -20,15 +20,7 @@ PICTURE: dict[int | str, dict[str, Any]] = {200: {"content": {"image/jpeg": BINA
     "/venues/{venue_id}/cameras/{camera}/snapshot",
     openapi_extra=needs_scope("read"),
     response_class=Response,
-    responses={
-        **PICTURE,
-        **problem_responses(
-            *OF_SOURCES,
-            "missing-camera",
-            *OF_IMAGES,
-            "frame-size",
-        ),
-    },
+    responses={**PICTURE, **problem_responses(*OF_SOURCES, "missing-camera", *OF_IMAGES, "frame-size")},
 )
 async def fetch_snapshot(venue_id: VenueIdPath, camera: CameraIdPath, context: InContext) -> Response:
     """Fetch a frame of a camera from its source, as it comes. Requests within two seconds get the same."""

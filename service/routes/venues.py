@@ -13,13 +13,7 @@ from service.api.problems import validation_problem
 from service.intake import sources
 from service.routes.contract.attribution import hide_other_actor
 from service.routes.contract.documented import header_docs, needs_scope
-from service.routes.contract.exported import (
-    DOCUMENTS,
-    ExportQuery,
-    FormatQuery,
-    export_response,
-    with_refined_poses,
-)
+from service.routes.contract.exported import DOCUMENTS, ExportQuery, FormatQuery, export_response, with_refined_poses
 from service.routes.contract.guarded import Guarded
 from service.routes.contract.paged import CURSOR, LIMIT, NEXT_PAGE, next_page
 from service.routes.contract.problem_docs import OF_EXPORTS, problem_responses
@@ -36,15 +30,7 @@ from service.schemas.names import ID_PATTERN, ListFields
 from service.schemas.problems import Problem
 from service.schemas.source_urls import SourceSecrets
 from service.schemas.trend import Trend
-from service.schemas.venue import (
-    PATCH_EXAMPLES,
-    ChangedVenue,
-    RestoredVenue,
-    Venue,
-    VenueIn,
-    Venues,
-    VenueSummary,
-)
+from service.schemas.venue import PATCH_EXAMPLES, ChangedVenue, RestoredVenue, Venue, VenueIn, Venues, VenueSummary
 from service.settings import Settings
 from service.store.preconditions import Precondition, venue_etag
 from service.store.refusals import camera_of, no_refined_since, no_such_venue
@@ -180,12 +166,7 @@ def list_venues(
     return listed
 
 
-@router.get(
-    "/{venue_id}",
-    openapi_extra=needs_scope("read"),
-    response_model=Venue,
-    responses=TAGGED,
-)
+@router.get("/{venue_id}", openapi_extra=needs_scope("read"), response_model=Venue, responses=TAGGED)
 def get_venue(venue: ExistingVenue, if_none_match: IfNoneMatch = None) -> Response:
     """Return a venue with the poses in use."""
     return tagged_json(venue.with_hidden_callbacks(), if_none_match)
@@ -198,10 +179,7 @@ def get_venue(venue: ExistingVenue, if_none_match: IfNoneMatch = None) -> Respon
     responses=DOCUMENTS | problem_responses(*OF_EXPORTS),
 )
 def export_venue_poses(
-    venue: ExistingVenue,
-    context: InContext,
-    wanted: Annotated[ExportQuery, Depends()],
-    form: FormatQuery = "json",
+    venue: ExistingVenue, context: InContext, wanted: Annotated[ExportQuery, Depends()], form: FormatQuery = "json"
 ) -> Response:
     """Export the poses in use to another tool's format; with `lens=refined` those of the last accepted job."""
     if wanted.lens == "refined":
@@ -234,10 +212,7 @@ def list_revisions(
 
 
 @router.get(
-    "/{venue_id}/cameras/{camera}/trend",
-    openapi_extra=needs_scope("read"),
-    response_model=Trend,
-    responses=TAGGED,
+    "/{venue_id}/cameras/{camera}/trend", openapi_extra=needs_scope("read"), response_model=Trend, responses=TAGGED
 )
 def get_camera_trend(
     venue: ExistingVenue,
@@ -300,12 +275,7 @@ def get_venue_health(venue_id: VenueIdPath, context: InContext) -> VenueHealth:
     },
 )
 def restore_venue(
-    venue_id: VenueIdPath,
-    wanted: Restore,
-    response: Response,
-    context: InContext,
-    by: ByActor,
-    precondition: IfMatch,
+    venue_id: VenueIdPath, wanted: Restore, response: Response, context: InContext, by: ByActor, precondition: IfMatch
 ) -> RestoredVenue:
     """Restore the poses of a revision, with their lenses and their ridge; that is a revision of its own.
 

@@ -4,13 +4,7 @@ from collections.abc import Iterable
 from datetime import datetime
 from typing import Annotated, Any, Literal, get_args
 
-from pydantic import (
-    ConfigDict,
-    Field,
-    ValidationInfo,
-    ValidatorFunctionWrapHandler,
-    WrapValidator,
-)
+from pydantic import ConfigDict, Field, ValidationInfo, ValidatorFunctionWrapHandler, WrapValidator
 
 from service.schemas.actor import Attributed
 from service.schemas.base import OPEN_WORD, UNREADABLE, Schema, Unreadable, is_empty, is_none, is_tolerant

@@ -3,13 +3,7 @@
 from datetime import datetime
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import (
-    AfterValidator,
-    ConfigDict,
-    Field,
-    StringConstraints,
-    model_validator,
-)
+from pydantic import AfterValidator, ConfigDict, Field, StringConstraints, model_validator
 
 from service.schemas.base import OPEN_WORD, Flag, Id, Integer, Name, Number, Schema, Timestamp
 from service.schemas.geometry import Pose, PoseIn

@@ -471,15 +471,7 @@ class CandidateResult(Schema):
 
 
 FindReason = Annotated[
-    Literal[
-        "no-lines",
-        "lines",
-        "few-lines",
-        "implausible",
-        "not-unique",
-        "not-confirmed",
-    ],
-    OPEN_WORD,
+    Literal["no-lines", "lines", "few-lines", "implausible", "not-unique", "not-confirmed"], OPEN_WORD
 ]
 
 

@@ -45,9 +45,7 @@ class Schedule(Schema):
         description="Frames of each camera, fused into one picture: whatever moves, such as players, is removed.",
     )
     spacing_s: Annotated[Number, Field(ge=0.1, le=LONGEST_SPACING_S)] = Field(
-        SPACING_S,
-        exclude_if=lambda spacing_s: spacing_s == SPACING_S,
-        description="Time from one frame to the next.",
+        SPACING_S, exclude_if=lambda spacing_s: spacing_s == SPACING_S, description="Time from one frame to the next."
     )
     options: Options | None = Field(None, description="Options of the calibrations; absent: the defaults.")
 

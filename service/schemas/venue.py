@@ -7,17 +7,7 @@ from pydantic import AfterValidator, ConfigDict, Field, model_validator
 
 from service.schemas import source_urls
 from service.schemas.addresses import HIDDEN, SourceUrl, hide_path, restore_url
-from service.schemas.base import (
-    OPEN_WORD,
-    UNREADABLE,
-    Id,
-    Name,
-    Number,
-    Schema,
-    Unreadable,
-    is_empty,
-    is_none,
-)
+from service.schemas.base import OPEN_WORD, UNREADABLE, Id, Name, Number, Schema, Unreadable, is_empty, is_none
 from service.schemas.events.webhooks import WEBHOOK_EXAMPLE, Webhook
 from service.schemas.field import FieldOfPlay
 from service.schemas.geometry import Light, Pose, PosedCamera, PoseIn, UnposedCamera, check_lens

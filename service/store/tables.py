@@ -127,13 +127,7 @@ jobs = sa.Table(
     # The queue.
     sa.Index("jobs_by_status", "status", "priority", "id"),
     sa.Index("one_job_per_key", "venue", "idempotency_key", unique=True),
-    sa.Index(
-        "one_active_job_per_venue",
-        "venue",
-        unique=True,
-        sqlite_where=ACTIVE,
-        postgresql_where=ACTIVE,
-    ),
+    sa.Index("one_active_job_per_venue", "venue", unique=True, sqlite_where=ACTIVE, postgresql_where=ACTIVE),
     sa.Index("jobs_by_end", "finished_at"),
     sa.Index(
         "jobs_with_frames",

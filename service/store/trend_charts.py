@@ -12,15 +12,7 @@ from math import hypot
 from statistics import fmean, median
 from typing import Any
 
-from service.control_charts import (
-    DECISION_SIGMA,
-    LIMIT_SIGMA,
-    NIGHTS_OF_BASELINE,
-    Baseline,
-    ChartPoint,
-    Night,
-    charted,
-)
+from service.control_charts import DECISION_SIGMA, LIMIT_SIGMA, NIGHTS_OF_BASELINE, Baseline, ChartPoint, Night, charted
 from service.schemas.trend import Chart, Quantity, Trend, TrendPoint, TrendState
 from service.store.unreadable import read_or
 

@@ -23,23 +23,9 @@ OF_KEYS = (
 )
 OF_BODIES = ("malformed-request", "too-slow", "body-too-large", "encoded-body")
 # Of files that should be pictures.
-OF_IMAGES = (
-    "empty-frame",
-    "frame-too-large",
-    "not-an-image",
-    "broken-image",
-    "truncated-image",
-    "too-many-pixels",
-)
+OF_IMAGES = ("empty-frame", "frame-too-large", "not-an-image", "broken-image", "truncated-image", "too-many-pixels")
 # Of requests that make a job of files.
-OF_UPLOADS = (
-    "not-a-file",
-    *OF_IMAGES,
-    "callback-refused",
-    "idempotency-key-reused",
-    "queue-full",
-    "disk-full",
-)
+OF_UPLOADS = ("not-a-file", *OF_IMAGES, "callback-refused", "idempotency-key-reused", "queue-full", "disk-full")
 OF_FRAMES = (*OF_UPLOADS, "unknown-camera", "missing-camera", "too-many-frames", "frame-size", "venue-replaced")
 OF_SOURCES = ("source-refused", "source-failed")
 # Statuses of problems that may pass: their answers can have a Retry-After.

@@ -7,12 +7,7 @@ from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import FormData
 
 from service.api.context import Context, InContext, VenueIdPath
-from service.routes.contract.documented import (
-    form_body,
-    needs_scope,
-    sent_reference,
-    submission_responses,
-)
+from service.routes.contract.documented import form_body, needs_scope, sent_reference, submission_responses
 from service.routes.contract.guarded import Guarded
 from service.routes.contract.problem_docs import OF_FRAMES, problem_responses
 from service.routes.submissions import forms, job_submission

@@ -36,11 +36,7 @@ UPLOAD = form_body(
     responses=submission_responses() | problem_responses(*OF_UPLOADS, "missing-photos", "too-many-photos"),
     openapi_extra=UPLOAD | needs_scope("calibrate"),
 )
-async def submit_lens_calibration(
-    request: Request,
-    context: InContext,
-    sender: FromSender,
-) -> Response:
+async def submit_lens_calibration(request: Request, context: InContext, sender: FromSender) -> Response:
     """Submit photos of a board, from which a job finds the lens. Its picture `coverage.jpg` shows what it rests on."""
     most = context.settings.max_photos
     async with forms.parsed_upload(request, context, None, "intrinsics", sender, most) as form:
