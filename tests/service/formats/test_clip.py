@@ -6,7 +6,7 @@ from dataclasses import replace
 from fractions import Fraction
 
 import cv2
-import jsonschema
+import jsonschema_rs
 import numpy as np
 import pytest
 
@@ -43,7 +43,7 @@ def written(tmp_path):
 def test_a_sample_for_each_camera_and_frame_is_valid_and_reprojects(written):
     samples = [json.loads(line) for line in (written / "final.cut.jsonl").read_text().splitlines()]
     assert len(samples) == 2 * FRAMES
-    validator = jsonschema.Draft202012Validator(SCHEMA)
+    validator = jsonschema_rs.Draft202012Validator(SCHEMA)
     for number, sample in enumerate(samples):
         validator.validate(sample)
         assert (sample["timing"]["sequenceNumber"], sample["sourceNumber"]) == (number // 2, 1 + number % 2)
@@ -66,7 +66,7 @@ def test_timecode_goes_on_after_an_hour_and_starts_anew_after_a_day():
         sample = json.loads(
             opentrackio.write_frame(shot(), opentrackio.Frame(number, Fraction(25), "measured"), SteadyAngles())
         )
-        jsonschema.Draft202012Validator(SCHEMA).validate(sample)
+        jsonschema_rs.Draft202012Validator(SCHEMA).validate(sample)
         assert [sample["timing"]["timecode"][part] for part in ("hours", "minutes", "seconds", "frames")] == expected
 
 

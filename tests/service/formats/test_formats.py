@@ -7,7 +7,7 @@ import zipfile
 from pathlib import Path
 
 import cv2
-import jsonschema
+import jsonschema_rs
 import numpy as np
 import pytest
 
@@ -101,7 +101,7 @@ def turn(axis, degrees):
 def test_opentrackio_is_valid_and_reprojects(rotation, distortion):
     camera = shot(distortion, rotation=rotation)
     sample = json.loads(opentrackio.write(camera))
-    jsonschema.Draft202012Validator(SCHEMA).validate(sample)
+    jsonschema_rs.Draft202012Validator(SCHEMA).validate(sample)
     world, pixels = seen_points(camera)
     assert farthest(project_by_opentrackio(sample, world), pixels) < AS_PUBLISHED_PX
 

@@ -12,7 +12,7 @@ from fractions import Fraction
 from io import StringIO
 from pathlib import Path
 
-import jsonschema
+import jsonschema_rs
 import pytest
 
 from service.live import host_lookup
@@ -82,7 +82,7 @@ class Sending:
 def test_samples_hold_to_the_schema_and_have_all_that_unreal_asks_of_a_camera(udp):
     with listening() as opened, Sending([OpenTrackIO(udp, "127.0.0.1", port_of(opened))]):
         samples = [opentrackio_sample(lambda: opened.recv(65536)) for _ in range(4)]
-    validator = jsonschema.Draft202012Validator(SCHEMA)
+    validator = jsonschema_rs.Draft202012Validator(SCHEMA)
     for _, sample in samples:
         validator.validate(sample)
         camera = sample["static"]["camera"]
