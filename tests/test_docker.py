@@ -52,7 +52,7 @@ def test_a_machine_that_cannot_try_the_image_says_so_and_is_told_apart_from_a_br
     """CI goes on with 77 and with nothing else."""
     tried = subprocess.run(["/bin/bash", DOCKER / "try-image"], capture_output=True, text=True, env={"PATH": ""})
     assert (tried.returncode, tried.stdout) == (77, "try-image: skipped: buildah is not installed.\n")
-    assert "docker/try-image || [ $? = 77 ]" in (ROOT / ".ci" / "run").read_text().splitlines()
+    assert 'wait "$image" || [ $? = 77 ]' in (ROOT / ".ci" / "run").read_text().splitlines()
 
 
 def test_the_image_is_tried_at_a_port_that_is_free():
