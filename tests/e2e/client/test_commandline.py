@@ -6,7 +6,6 @@ import signal
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 
 import httpx
 import pytest
@@ -388,11 +387,9 @@ def test_the_version_is_told(esc):
     assert esc("--version").stdout == f"esc {build.description()}\n"
 
 
-def test_a_shell_is_taught_the_commands():
+def test_a_shell_is_taught_the_commands(tmp_path):
     asked = {"_ESC_COMPLETE": "complete_bash", "COMP_WORDS": "esc job wa", "COMP_CWORD": "2"}
-    command = [Path(sys.executable).parent / "esc"]
-    completed = subprocess.run(command, env=os.environ | asked, capture_output=True, text=True, check=True)
-    assert completed.stdout.split() == ["wait"]
+    assert esc_here(tmp_path, **os.environ | asked).stdout.split() == ["wait"]
 
 
 def test_the_form_of_a_lens_file_is_printed_whole_with_its_brackets(tmp_path):

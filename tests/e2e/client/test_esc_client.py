@@ -75,6 +75,7 @@ asyncio.run(look(*sys.argv[1:]))
 """
 IMPORTED = """
 import esc_client
+print(esc_client.__version__)
 from importlib import import_module
 from pkgutil import walk_packages
 for module in walk_packages(esc_client.__path__, "esc_client."):
@@ -204,17 +205,14 @@ def test_the_wheel_has_the_client_and_nothing_that_it_does_not_reach(wheel):
     assert imported - sys.stdlib_module_names == {"esc_client", "httpx", "pydantic", "croniter", "numpy"}
 
 
-def test_every_module_is_imported_where_nothing_else_of_esc_is(program):
-    # NumPy is not asked for: the service alone judges what a lens does over its picture.
-    assert program(IMPORTED) == ["esc_client.schemas.lens_map numpy"]
-
-
-def test_its_version_is_that_of_the_service(wheel, program):
+def test_every_module_is_imported_where_nothing_else_of_esc_is_and_its_version_is_that_of_the_service(wheel, program):
     version = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
     assert wheel.name == f"esc_client-{version}-py3-none-any.whl"
-    assert program("import esc_client; print(esc_client.__version__)") == [version]
+    # NumPy is not asked for: the service alone judges what a lens does over its picture.
+    assert program(IMPORTED) == [version, "esc_client.schemas.lens_map numpy"]
 
 
+@pytest.mark.long
 def test_alone_beside_a_package_named_service_it_calibrates_and_follows(service, program, tmp_path, name):
     (tmp_path / "left.png").write_bytes(png())
     assert program(BLOCKING, service.url, name, tmp_path / "left.png") == [
@@ -224,6 +222,7 @@ def test_alone_beside_a_package_named_service_it_calibrates_and_follows(service,
     ]
 
 
+@pytest.mark.long
 def test_alone_it_does_the_same_without_blocking(service, program, name):
     service.calibrated(service.venue(name))
     assert program(AWAITED, service.url, name) == ["accept succeeded {"]
@@ -272,6 +271,7 @@ def test_programs_that_use_it_are_type_checked(python, tmp_path):
     ]
 
 
+@pytest.mark.long
 def test_it_is_not_installed_as_editable_which_would_have_no_modules(tmp_path):
     source = copied(tmp_path / "source")
     asked = [sys.executable, "-c", "from setuptools.build_meta import build_editable; build_editable('.')"]

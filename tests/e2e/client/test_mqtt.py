@@ -16,6 +16,7 @@ from testbed import warm
 from testbed.network_cameras import NetworkCamera
 from testbed.ports import free_port
 from testbed.running import venue, wait_for
+from tests.e2e.conftest import FROM_HERE, shared
 from tests.worker.certificates import certificate
 
 USER, PASSWORD = "esc", "pass word"
@@ -84,6 +85,12 @@ class Watcher:
     def close(self) -> None:
         self.client.disconnect()
         self.client.loop_stop()
+
+
+@pytest.fixture(scope="module")
+def service(tmp_path_factory):
+    """A service of their own: each command publishes all venues that a service has."""
+    yield from shared(tmp_path_factory.mktemp("mqtt"), **FROM_HERE)
 
 
 @pytest.fixture(scope="module")

@@ -120,9 +120,10 @@ def locate(service, name, points, camera="left", files=(), **query):
     return service.http.post(f"/venues/{name}/cameras/{camera}/locate", files=form, params=query)
 
 
-def test_clicked_points_become_a_first_pose_while_the_caller_waits(service, name):
+def test_clicked_points_become_a_first_pose_while_the_caller_waits_and_are_shown_in_their_frame(service, name):
     service.http.put(f"/venues/{name}", json=venue(name)).raise_for_status()
-    answer = locate(service, name, points(clicks(noise_px=1.0).swapped(1, 4)), **WAIT)
+    frame = [("left", ("left.png", png(*SIZE, shade=70)))]
+    answer = locate(service, name, points(clicks(noise_px=1.0).swapped(1, 4)), files=frame, **WAIT)
     job = answer.json()
     assert (answer.status_code, job["kind"], job["venue"], job["status"]) == (200, "locate", name, "succeeded")
     result = job["result"]
@@ -134,12 +135,6 @@ def test_clicked_points_become_a_first_pose_while_the_caller_waits(service, name
     # It is an answer, not a change.
     stored = service.http.get(f"/venues/{name}").json()["cameras"][0]["pose"]
     assert stored["position"] == [-1.0, -50.0, 8.0]
-
-
-def test_the_frame_the_points_were_clicked_in_is_shown_with_them(service, name):
-    service.http.put(f"/venues/{name}", json=venue(name)).raise_for_status()
-    frame = [("left", ("left.png", png(*SIZE, shade=70)))]
-    job = locate(service, name, points(), files=frame, **WAIT).json()
     picture = service.http.get(job["links"]["points"]).raise_for_status().content
     drawn = cv2.imdecode(np.frombuffer(picture, np.uint8), cv2.IMREAD_COLOR)
     assert drawn.shape == (*SIZE[::-1], 3)
