@@ -5,16 +5,18 @@ from numpy.typing import ArrayLike
 
 from worker.calibration.geometry.arrays import Array
 
+IDENTITY = np.eye(3)
+
 
 def rotation_matrices(vectors: ArrayLike) -> Array:
     """Return matrices (..., 3, 3) of rotation vectors (..., 3), rad (Rodrigues)."""
     v = np.asarray(vectors, dtype=float)
-    angle = np.linalg.norm(v, axis=-1)[..., None, None]
+    angle = _lengths(v)[..., None]
     cross = cross_matrices(v)
     # sin(a)/a and (1-cos(a))/a², both finite at a = 0; np.sinc(x) is sin(pi x)/(pi x).
     a = np.sinc(angle / np.pi)
     b = 0.5 * np.sinc(angle / (2 * np.pi)) ** 2
-    return np.eye(3) + a * cross + b * (cross @ cross)
+    return IDENTITY + a * cross + b * (cross @ cross)
 
 
 def rotation_vectors(matrices: ArrayLike) -> Array:
@@ -23,7 +25,7 @@ def rotation_vectors(matrices: ArrayLike) -> Array:
     Goes through the unit quaternion of largest component, which stays exact near 0 and near pi.
     """
     m = np.asarray(matrices, dtype=float)
-    trace = np.trace(m, axis1=-2, axis2=-1)
+    trace = m[..., 0, 0] + m[..., 1, 1] + m[..., 2, 2]
     # Four times the outer product of the quaternion (w, x, y, z) with itself; its best-conditioned row is taken.
     q = np.empty((*m.shape[:-2], 4, 4))
     q[..., 0, 0] = 1 + trace
@@ -34,9 +36,9 @@ def rotation_vectors(matrices: ArrayLike) -> Array:
         q[..., j + 1, k + 1] = q[..., k + 1, j + 1] = m[..., k, j] + m[..., j, k]
     best = np.argmax(np.diagonal(q, axis1=-2, axis2=-1), axis=-1)
     row = np.take_along_axis(q, best[..., None, None], axis=-2)[..., 0, :]
-    row = row / np.linalg.norm(row, axis=-1, keepdims=True)
+    row = row / _lengths(row)
     row = np.where(row[..., :1] < 0, -row, row)
-    sine = np.linalg.norm(row[..., 1:], axis=-1, keepdims=True)
+    sine = _lengths(row[..., 1:])
     half = np.arctan2(sine, row[..., :1])
     # half / sin(half) -> 1 for small angles.
     return 2 * row[..., 1:] * np.where(sine > 1e-12, half / np.maximum(sine, 1e-300), 1.0)
@@ -44,12 +46,20 @@ def rotation_vectors(matrices: ArrayLike) -> Array:
 
 def cross_matrices(vectors: Array) -> Array:
     """Return matrices (..., 3, 3) of the cross product with vectors (..., 3)."""
-    x, y, z = np.moveaxis(vectors, -1, 0)
-    zero = np.zeros_like(x)
-    return np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(*vectors.shape, 3)
+    x, y, z = vectors[..., 0], vectors[..., 1], vectors[..., 2]
+    cross = np.zeros((*vectors.shape, 3))
+    cross[..., 0, 1], cross[..., 0, 2] = -z, y
+    cross[..., 1, 0], cross[..., 1, 2] = z, -x
+    cross[..., 2, 0], cross[..., 2, 1] = -y, x
+    return cross
 
 
 def rotation_angles_deg(a: ArrayLike, b: ArrayLike) -> Array:
     """Return the angle in degrees of the rotation between rotation vectors (..., 3) and (..., 3)."""
     relative = rotation_matrices(a) @ np.swapaxes(rotation_matrices(b), -1, -2)
     return np.degrees(np.linalg.norm(rotation_vectors(relative), axis=-1))
+
+
+def _lengths(vectors: Array) -> Array:
+    """Return lengths (..., 1) of vectors (..., n): `np.linalg.norm` without its checks, which cost more."""
+    return np.sqrt(np.add.reduce(vectors * vectors, axis=-1, keepdims=True))
