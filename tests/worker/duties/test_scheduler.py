@@ -21,7 +21,7 @@ from service.store.statistics.job_outcome import ENDED
 from service.store.statistics.snapshot import read_statistics as look_at_figures
 from testbed.homes import in_both_homes
 from testbed.network_cameras import NetworkCamera
-from testbed.running import png, venue
+from testbed.running import png, venue, wait_for
 from worker.duties import scheduler
 from worker.duties.scheduler import DEFER, Scheduler
 
@@ -68,6 +68,16 @@ def all_due(home, minutes=1):
     a_while_ago = home.schedules.now() - timedelta(minutes=minutes)
     with home.engine.begin() as connection:
         connection.execute(sa.update(tables.schedules).values(due_at=a_while_ago, look_at=a_while_ago))
+
+
+def poll_until(duty, condition):
+    """Poll with pauses, as a worker does, until a condition is true; return what it is."""
+
+    def polled():
+        duty.poll()
+        return condition()
+
+    return wait_for(polled)
 
 
 def look(duty, times=1):
@@ -259,8 +269,7 @@ def test_a_camera_that_is_slow_holds_up_no_other_venue(home_of_schedules, duty, 
     with home.engine.begin() as connection:
         due = sa.update(tables.schedules).where(tables.schedules.c.venue == "c")
         connection.execute(due.values(due_at=home.schedules.now(), look_at=home.schedules.now()))
-    while "c" not in [job.venue for job in waiting(home)]:
-        duty.poll()
+    poll_until(duty, lambda: "c" in [job.venue for job in waiting(home)])
     put_through.set()
     duty.finish()
 
@@ -281,22 +290,18 @@ def test_venues_whose_cameras_answer_do_not_wait_for_silent_ones(home_of_schedul
     monkeypatch.setattr(home.snapshots, "take_of_all", take)
     all_due(home, minutes=2)
     # Each is tried once where others wait for it, and from then on where only its like do.
-    while look_at_figures(home.engine, 1).schedules_late_s[0]:
-        duty.poll()
+    poll_until(duty, lambda: not look_at_figures(home.engine, 1).schedules_late_s[0])
     put(home, "live")
     with home.engine.begin() as connection:
         now, s = home.schedules.now(), tables.schedules.c
         connection.execute(sa.update(tables.schedules).where(s.venue == "live").values(due_at=now, look_at=now))
-    while not waiting(home):
-        duty.poll()
-    assert [job.venue for job in waiting(home)] == ["live"]
+    assert [job.venue for job in poll_until(duty, lambda: waiting(home))] == ["live"]
     answered, silent_ones = look_at_figures(home.engine, 1).schedules_late_s
     # Its job waits a moment before its schedule is done.
     assert answered < 30
     assert silent_ones >= 120
     given_up.set()
-    while look_at_figures(home.engine, 1).schedules_late_s[1]:
-        duty.poll()
+    poll_until(duty, lambda: not look_at_figures(home.engine, 1).schedules_late_s[1])
     assert sorted(job.venue for job in home.jobs.page(JobPage(100, status="failed")).jobs) == sorted(silent)
 
 
@@ -341,9 +346,7 @@ def quick_fetches(home, monkeypatch):
 def fire_until_a_job_waits(home):
     duty = Scheduler(home.settings, home.schedules, home.venues, home.submissions, home.from_sources, home.disk)
     all_due(home)
-    while not (jobs := waiting(home)):
-        duty.poll()
-    assert [job.venue for job in jobs] == ["z-live"]
+    assert [job.venue for job in poll_until(duty, lambda: waiting(home))] == ["z-live"]
     duty.finish()
 
 
