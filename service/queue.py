@@ -11,6 +11,7 @@ import threading
 import uuid
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
+from functools import cached_property
 
 import sqlalchemy as sa
 import structlog
@@ -184,13 +185,18 @@ class WorkerQueue:
         free = [queue for queue in self._queues if self._running(queue) < self._at_once[queue.name]]
         if not free:
             return []
+        with self._engine._sys_db.engine.begin() as connection:
+            answers = connection.execute(self._any_waits).one()
+        return [queue for queue, any_wait in zip(self._queues, answers, strict=True) if any_wait and queue in free]
+
+    @cached_property
+    def _any_waits(self) -> sa.Executable:
+        """The question whether jobs wait in each queue. To put it together anew takes as long as to ask it."""
         row = self._engine._sys_db.tables.workflow_status.c
         # Not a parameter: the index holds these alone, which the database must see when it plans.
         waits = row.status == sa.literal_column(f"'{QueueStatus.ENQUEUED.value}'")
-        found = [sa.exists(sa.select(row.queue_name).where(row.queue_name == queue.name, waits)) for queue in free]
-        with self._engine._sys_db.engine.begin() as connection:
-            answers = connection.execute(sa.select(*found)).one()
-        return [queue for queue, any_wait in zip(free, answers, strict=True) if any_wait]
+        of_queues = (sa.select(row.queue_name).where(row.queue_name == queue.name, waits) for queue in self._queues)
+        return sa.select(*map(sa.exists, of_queues))
 
     def _take(self, queue: EngineQueue) -> None:
         owner, engine = uuid.uuid4().hex, self._engine._sys_db
