@@ -68,8 +68,9 @@ def person(
     browser: Browser, url: str, scheme: str = "dark", size: tuple[int, int] = (1280, 900), zone: str = "UTC"
 ) -> Iterator[BrowserContext]:
     """Somebody who looks at a service; what the browser keeps for them is theirs."""
-    viewport = {"width": size[0], "height": size[1]}
-    context = browser.new_context(base_url=url, color_scheme=scheme, viewport=viewport, timezone_id=zone)
+    # What turns while a job runs is drawn sixty times a second, and no test looks at it.
+    how = {"viewport": {"width": size[0], "height": size[1]}, "reduced_motion": "reduce"}
+    context = browser.new_context(base_url=url, color_scheme=scheme, timezone_id=zone, **how)
     context.set_default_timeout(PATIENCE_MS)
     try:
         yield context
