@@ -94,8 +94,7 @@ def test_a_camera_that_was_turned_on_its_pole_is_found_and_proposed_with_how_far
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("rolled_deg", [-12.0, 25.0, 40.0])
-@pytest.mark.parametrize("recover", ["propose", "accept"])
+@pytest.mark.parametrize(("rolled_deg", "recover"), [(-12.0, "accept"), (25.0, "propose"), (40.0, "accept")])
 def test_a_camera_that_was_rolled_about_its_view_is_knocked_and_nothing_else(rolled_deg, recover):
     left, right = pair()
     knocked = [rolled(moved(left, TURN, SHIFT), rolled_deg), moved(right, *WIND)]

@@ -51,10 +51,10 @@ def test_a_jpeg_that_is_damaged_in_its_scan_is_not_decoded(kind):
 @pytest.mark.long
 @pytest.mark.parametrize("quality", [80, 95])
 @pytest.mark.parametrize("kind", DAMAGES)
-def test_none_of_eight_hundred_damages_of_a_frame_of_4k_is_decoded(kind, quality):
+def test_none_of_two_hundred_damages_of_a_frame_of_4k_is_decoded(kind, quality):
     frame = cv2.imread("demo/left.jpg")
     whole = cv2.imencode(".jpg", frame, [cv2.IMWRITE_JPEG_QUALITY, quality])[1].tobytes()
-    assert unseen_damages(whole, kind, 100) == 0
+    assert unseen_damages(whole, kind, 25) == 0
 
 
 @pytest.mark.long

