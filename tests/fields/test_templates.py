@@ -5,7 +5,7 @@ import re
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fields.measures import value
@@ -115,6 +115,7 @@ def test_only_ice_hockey_has_lines_that_are_not_white():
     assert coloured == {"ice-hockey"}
 
 
+@settings(max_examples=25)
 @given(st.data())
 @every
 def test_markings_of_any_size_stay_on_the_field(name, data):
