@@ -15,6 +15,7 @@ from service.routes.contract.guarded import Guarded
 from service.settings import Settings
 from testbed.running import Service, keys_in, png, upload, venue, wait_for
 from tests.e2e.commands import esc_here, esc_process
+from tools.openapi import document
 
 SCOPES = ("read", "calibrate", "admin")
 # What the service can do is no secret.
@@ -143,28 +144,28 @@ def test_found_cameras_of_a_new_venue_are_stored_by_an_admins_key_alone(guarded,
     assert told == [403, 403, 201, 200]
 
 
-def test_the_document_says_which_scope_a_route_needs(guarded):
-    document = guarded.http.get("/openapi.json").json()
-    assert document["components"]["securitySchemes"]["key"]["scheme"] == "bearer"
-    assert document["paths"]["/venues/{venue_id}"]["put"]["security"] == [{"key": ["admin"]}]
-    assert {"401", "403", "429"} <= document["paths"]["/venues/{venue_id}"]["put"]["responses"].keys()
-    assert document["paths"]["/livez"]["get"]["security"] == []
+def test_the_document_says_which_scope_a_route_needs():
+    made = document()
+    assert made["components"]["securitySchemes"]["key"]["scheme"] == "bearer"
+    assert made["paths"]["/venues/{venue_id}"]["put"]["security"] == [{"key": ["admin"]}]
+    assert {"401", "403", "429"} <= made["paths"]["/venues/{venue_id}"]["put"]["responses"].keys()
+    assert made["paths"]["/livez"]["get"]["security"] == []
 
 
-def test_the_document_defines_the_world_and_tells_what_each_route_does(guarded):
-    document = guarded.http.get("/openapi.json").json()
-    world = document["info"]["description"]
+def test_the_document_defines_the_world_and_tells_what_each_route_does():
+    made = document()
+    world = made["info"]["description"]
     for told in ("centre of the field", "`length_m`", "z up", "metres", "world to camera", "PUT /venues/{venue_id}"):
         assert told in world
-    used = {tag for path in document["paths"].values() for operation in path.values() for tag in operation["tags"]}
-    assert used == {tag["name"] for tag in document["tags"] if tag["description"]}
-    for path in (*document["paths"].values(), *document["webhooks"].values()):
+    used = {tag for path in made["paths"].values() for operation in path.values() for tag in operation["tags"]}
+    assert used == {tag["name"] for tag in made["tags"] if tag["description"]}
+    for path in (*made["paths"].values(), *made["webhooks"].values()):
         for operation in path.values():
             assert operation["description"].replace("`", "").startswith(operation["summary"][:20])
             assert len(operation["summary"].split()) > 2, operation["summary"]
             # The page shows summaries as they are, and descriptions as Markdown.
             assert "`" not in operation["summary"]
-    layer = document["paths"]["/jobs/{job_id}/stored/{camera}.png"]["get"]
+    layer = made["paths"]["/jobs/{job_id}/stored/{camera}.png"]["get"]
     assert layer["summary"] == "Draw the field by the pose that was stored, to lay over a frame"
 
 
