@@ -5,8 +5,6 @@ from numpy.typing import ArrayLike
 
 from worker.calibration.geometry.arrays import Array
 
-IDENTITY = np.eye(3)
-
 
 def rotation_matrices(vectors: ArrayLike) -> Array:
     """Return matrices (..., 3, 3) of rotation vectors (..., 3), rad (Rodrigues)."""
@@ -16,7 +14,7 @@ def rotation_matrices(vectors: ArrayLike) -> Array:
     # sin(a)/a and (1-cos(a))/a², both finite at a = 0; np.sinc(x) is sin(pi x)/(pi x).
     a = np.sinc(angle / np.pi)
     b = 0.5 * np.sinc(angle / (2 * np.pi)) ** 2
-    return IDENTITY + a * cross + b * (cross @ cross)
+    return np.eye(3) + a * cross + b * (cross @ cross)
 
 
 def rotation_vectors(matrices: ArrayLike) -> Array:
