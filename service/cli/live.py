@@ -29,7 +29,6 @@ from service.cli.service_client import load_venue
 from service.cli.service_settings import load_settings
 from service.cli.tracked_streams import TrackedStreams
 from service.client import Client, NotUnderstood, Refused
-from service.formats.freed import LARGEST_COUNT, EncoderCounts
 from service.live.destinations import (
     OPENTRACKIO_PORT,
     Destination,
@@ -42,8 +41,9 @@ from service.live.destinations import (
 from service.live.recovery import Recovery
 from service.live.reports import LiveReporter
 from service.live.stored_poses import StoredPoses, send_stored_poses
+from service.schemas.encoders import LARGEST_COUNT, FocusEncoder, LensEncoders, ZoomEncoder
 from service.schemas.job import Job
-from service.schemas.venue import Venue
+from service.schemas.venue import Camera, Venue
 
 # Accepted jobs come every few minutes; a renderer may see the new pose so much later.
 LOOK_AGAIN_S = 2.0
@@ -105,7 +105,7 @@ def live(
         typer.Option(
             "--zoom",
             metavar="CAMERA=COUNT",
-            help="Send this count as the zoom of a camera by FreeD, 0 to 16777215: one of the renderer's lens file.",
+            help="Send this count as the zoom of a camera by FreeD, 0 to 16777215, whatever table the venue has.",
         ),
     ] = None,
     focus: Annotated[
@@ -150,10 +150,22 @@ def live(
         fail("--zoom and --focus are sent by FreeD alone: add --freed HOST:PORT", USAGE)
     if not (opentrackio or freed or as_json):
         opentrackio = [MULTICAST]
+    trackers = [
+        (to, () if to == MULTICAST else _parse_address(to, "--opentrackio", OPENTRACKIO_PORT))
+        for to in opentrackio or []
+    ]
+    renderers = [(to, _parse_address(to, "--freed", None)) for to in freed or []]
     with UdpSocket(interface) as socket:
-        destinations = _destinations(socket, opentrackio or [], freed or [], zooms, focuses, as_json=as_json)
         stored = load_venue(venue, url, api_key)
         require_cameras(stored, [*zooms, *focuses])
+        destinations: dict[str, Destination] = {
+            f"opentrackio {name}": OpenTrackIO(socket, *to) for name, to in trackers
+        }
+        encoders = {camera.id: _with_counts(camera, zooms, focuses) for camera in stored.cameras}
+        axes = load_settings().freed_axes if renderers else ""
+        destinations |= {f"freed {name}": FreeD(socket, *to, axes, encoders) for name, to in renderers}
+        if as_json:
+            destinations["json"] = JsonLines(sys.stdout)
         service = None if Path(venue).is_file() else (url, api_key)
         _send(stored, destinations, sample_rate, addresses, follow_every, predict / 1000, service, recover=recover)
 
@@ -289,29 +301,16 @@ class _RecoveryNotes:
         self._trouble.say(f"Lost: camera {', '.join(lost)}, and the service does not calibrate the venue: {error}")
 
 
-def _destinations(
-    socket: UdpSocket,
-    opentrackio: Sequence[str],
-    freed: Sequence[str],
-    zooms: Mapping[str, int],
-    focuses: Mapping[str, int],
-    *,
-    as_json: bool,
-) -> dict[str, Destination]:
-    """Return the destinations by their names, which reports and notes have."""
-    found: dict[str, Destination] = {
-        f"opentrackio {address}": OpenTrackIO(socket)
-        if address == MULTICAST
-        else OpenTrackIO(socket, *_parse_address(address, "--opentrackio", OPENTRACKIO_PORT))
-        for address in opentrackio
-    }
-    axes = load_settings().freed_axes if freed else ""
-    counts = {
-        camera: EncoderCounts(zooms.get(camera, 0), focuses.get(camera, 0)) for camera in zooms.keys() | focuses.keys()
-    }
-    for address in freed:
-        found[f"freed {address}"] = FreeD(socket, *_parse_address(address, "--freed", None), axes, counts)
-    return found | {"json": JsonLines(sys.stdout)} if as_json else found
+def _with_counts(camera: Camera, zooms: Mapping[str, int], focuses: Mapping[str, int]) -> LensEncoders:
+    """Return the encoders of a camera, with a table of one point for a count that an option gives."""
+    encoders = camera.encoders or LensEncoders()
+    if camera.id in zooms:
+        zoom = ZoomEncoder(sensor_width_mm=1, counts=[[1, zooms[camera.id]]])
+        encoders = encoders.model_copy(update={"zoom": zoom})
+    if camera.id in focuses:
+        focus = FocusEncoder(distance_m=1, counts=[[1, focuses[camera.id]]])
+        encoders = encoders.model_copy(update={"focus": focus})
+    return encoders
 
 
 def _parse_address(text: str, option: str, usual_port: int | None) -> tuple[str, int]:

@@ -5,6 +5,7 @@ Imports the engine, see `local_engine`.
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -28,14 +29,14 @@ def tracking(venue: Venue, every: int, stem: Path | None, freed_axes: str) -> It
         yield follow
         follow.finish()
         return
-    numbers = {camera.id: number for number, camera in enumerate(venue.cameras, 1)}
+    stored = {
+        camera.id: NumberedCamera(camera, number, camera.encoders) for number, camera in enumerate(venue.cameras, 1)
+    }
     try:
-        with ClipPoses(
-            stem, [NumberedCamera(camera, numbers[camera.id]) for camera in venue.cameras], freed_axes
-        ) as poses:
+        with ClipPoses(stem, [*stored.values()], freed_axes) as poses:
 
             def keep(moment: TrackedMoment, rate: Fraction) -> None:
-                poses.add([_tracked_camera(one, numbers) for one in moment.cameras], rate)
+                poses.add([_tracked_camera(one, stored[one.camera.id]) for one in moment.cameras], rate)
 
             follow = TrackedGeometryFactory(every, keep)
             yield follow
@@ -63,10 +64,10 @@ def motion_document(motion: MotionSummary) -> dict[str, Any]:
     }
 
 
-def _tracked_camera(followed: TrackedPose, numbers: Mapping[str, int]) -> TrackedCamera:
+def _tracked_camera(followed: TrackedPose, stored: NumberedCamera) -> TrackedCamera:
     sigma, motion = followed.sigma, followed.motion_sigma
     return TrackedCamera(
-        NumberedCamera(camera_document(followed.camera), numbers[followed.camera.id]),
+        replace(stored, camera=camera_document(followed.camera)),
         followed.how,
         (sigma.rotation_deg, sigma.position_m),
         (motion.rotation_deg, motion.position_m),

@@ -3,7 +3,7 @@
 Layout (Vinten, "Free-d"): D1, camera id, then big-endian signed 24-bit numbers: pan, tilt, roll in 1/32768 degree, X,
 Y and height in 1/64 mm, zoom and focus as unsigned counts of an encoder, two spare bytes, and a checksum that makes the
 sum 0x40 modulo 256. There is no lens in it: whoever reads it must have the intrinsics from elsewhere, and may look them
-up by the counts, which nobody measures here.
+up by the counts, which the tables of the camera's `LensEncoders` give; without a table they are 0.
 
 Pan is positive to the right, tilt upwards, roll clockwise from behind; a camera without any looks along y of the pitch.
 Vendors differ in that: `axes` says what goes where.
@@ -11,8 +11,7 @@ Vendors differ in that: `axes` says what goes where.
 
 import math
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 from service.formats.lens import NumberedCamera
 from service.formats.opentrackio import AHEAD_IS_Y, pan_tilt_roll
@@ -21,37 +20,33 @@ from service.schemas.problems import Problem
 
 STEPS_PER_DEGREE = 32768
 STEPS_PER_METRE = 64_000
-LARGEST_COUNT = 2**24 - 1
 AXIS = re.compile(r"(?P<sign>-?)(?P<name>[a-z]+)(?P<offset>[+-][0-9.]+)?")
 
 
-@dataclass(frozen=True)
-class EncoderCounts:
-    """Counts that FreeD has for the zoom and the focus of a camera."""
-
-    zoom: int = 0
-    focus: int = 0
-
-
-NO_ENCODERS = EncoderCounts()
-
-
-def write(shots: Sequence[NumberedCamera], axes: str, counts: Mapping[str, EncoderCounts] | None = None) -> bytes:
+def write(shots: Sequence[NumberedCamera], axes: str) -> bytes:
     """Return a packet per camera, in the order of the venue; its id is the number of the camera there, from 1.
 
-    `axes`: the values of X, Y, height, pan, tilt and roll: `x y z pan tilt roll`, or `y -x z -pan+90 tilt roll`;
-    `counts`: by camera; of others they are 0.
+    `axes`: the values of X, Y, height, pan, tilt and roll: `x y z pan tilt roll`, or `y -x z -pan+90 tilt roll`.
     """
-    return b"".join(_packet(shot, axes, (counts or {}).get(shot.id, NO_ENCODERS)) for shot in shots)
+    return b"".join(_packet(shot, axes) for shot in shots)
 
 
-def _packet(shot: NumberedCamera, axes: str, counts: EncoderCounts) -> bytes:
+def _packet(shot: NumberedCamera, axes: str) -> bytes:
     x, y, height, pan, tilt, roll = _mapped(shot, axes)
     content = bytes([0xD1, shot.number])
     content += b"".join(_steps(shot, "degrees", value, STEPS_PER_DEGREE) for value in (pan, tilt, roll))
     content += b"".join(_steps(shot, "m", value, STEPS_PER_METRE) for value in (x, y, height))
-    content += counts.zoom.to_bytes(3, "big") + counts.focus.to_bytes(3, "big") + bytes(2)
+    content += b"".join(count.to_bytes(3, "big") for count in _counts(shot)) + bytes(2)
     return content + bytes([(0x40 - sum(content)) % 256])
+
+
+def _counts(shot: NumberedCamera) -> tuple[int, int]:
+    """Return the counts of zoom and focus."""
+    zoom, focus = (None, None) if shot.encoders is None else (shot.encoders.zoom, shot.encoders.focus)
+    return (
+        0 if zoom is None else zoom.count_at(zoom.focal_length_mm(shot.camera)),
+        0 if focus is None else focus.count_at(focus.distance_m),
+    )
 
 
 def _mapped(shot: NumberedCamera, axes: str) -> list[float]:

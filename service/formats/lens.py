@@ -4,6 +4,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 
 from service.formats.rotations import Matrix, matrix_of
+from service.schemas.encoders import LensEncoders
 from service.schemas.geometry import COEFFICIENTS as COEFFICIENTS_BY_MODEL
 from service.schemas.geometry import Pose, PosedCamera, UnposedCamera
 from service.schemas.problems import Problem
@@ -18,11 +19,12 @@ THIN_PRISM = ("s1", "s2", "s3", "s4")
 class NumberedCamera:
     """A camera with its number in the venue, from 1, which formats without names have.
 
-    `camera`: a `PosedCamera`, but of files that have lenses alone.
+    `camera`: a `PosedCamera`, but of files that have lenses alone; `encoders`: tables of its zoom and focus.
     """
 
     camera: UnposedCamera
     number: int
+    encoders: LensEncoders | None = None
 
     @property
     def id(self) -> str:

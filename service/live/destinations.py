@@ -7,7 +7,7 @@ import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from fractions import Fraction
 from io import TextIOWrapper
@@ -17,6 +17,7 @@ from service.formats import freed, opentrackio
 from service.formats.lens import NumberedCamera
 from service.live.host_lookup import HostLookup
 from service.live.packets import datagrams
+from service.schemas.encoders import LensEncoders
 from service.schemas.live import LiveClock
 
 # Multicast groups of OpenTrackIO: 239.135.1.N for source number N.
@@ -129,18 +130,19 @@ class OpenTrackIO:
 
 @dataclass(frozen=True)
 class FreeD:
-    """Packets of FreeD D1, a datagram for each camera."""
+    """Packets of FreeD D1, a datagram for each camera; `encoders`: tables of their zoom and focus, by camera."""
 
     socket: UdpSocket
     host: str
     port: int
     axes: str
-    counts: Mapping[str, freed.EncoderCounts] | None = None
+    encoders: Mapping[str, LensEncoders | None] = field(default_factory=dict)
 
     def send(self, samples: Sequence[Sample]) -> None:
         """Send a packet of each camera."""
         for sample in samples:
-            self.socket.send(freed.write([sample.shot], self.axes, self.counts), self.host, self.port)
+            shot = replace(sample.shot, encoders=self.encoders.get(sample.shot.id))
+            self.socket.send(freed.write([shot], self.axes), self.host, self.port)
 
 
 @dataclass(frozen=True)

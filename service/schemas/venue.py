@@ -8,6 +8,7 @@ from pydantic import AfterValidator, ConfigDict, Field, model_validator
 from service.schemas import source_urls
 from service.schemas.addresses import HIDDEN, SourceUrl, hide_path, restore_url
 from service.schemas.base import OPEN_WORD, UNREADABLE, Id, Name, Number, Schema, Unreadable, is_empty, is_none
+from service.schemas.encoders import LensEncoders
 from service.schemas.events.webhooks import WEBHOOK_EXAMPLE, Webhook
 from service.schemas.field import FieldOfPlay
 from service.schemas.geometry import Light, Pose, PosedCamera, PoseIn, UnposedCamera, check_lens
@@ -57,6 +58,7 @@ Ignore = Annotated[
 ]
 
 LIGHT = "Photometric correction for stitched views; accepted calibrations measure it and change it slowly."
+ENCODERS = "Tables of its zoom and focus for FreeD; null: their counts are 0."
 
 
 class CameraIn(UnposedCamera):
@@ -65,6 +67,7 @@ class CameraIn(UnposedCamera):
     pose: PoseIn
     ignore: Ignore = Field([])
     light: Light | None = Field(None, description=LIGHT)
+    encoders: LensEncoders | None = Field(None, description=ENCODERS)
     source: SourceUrl | None = Field(
         None,
         description="Address of its frames: a JPEG or PNG, motion JPEG, or an RTSP stream. User and password, also in "
@@ -103,6 +106,7 @@ class Camera(PosedCamera):
 
     ignore: Ignore = Field([])
     light: Light | None = Field(None, description=LIGHT)
+    encoders: LensEncoders | None = Field(None, exclude_if=is_none, description=ENCODERS)
     # Old versions stored parameters that count as secret now.
     source: Annotated[str, AfterValidator(source_urls.hide_secrets)] | None = Field(
         None, description="Address of its frames, without secrets."
@@ -253,7 +257,9 @@ class Venue(VenueSettings):
         # Imported late: NumPy loads slowly, and most readers of venues do not need it.
         from service.schemas.lens_map import lens_warnings
 
-        return [words for camera in self.cameras for words in lens_warnings(camera)]
+        zooms = [(camera, camera.encoders.zoom) for camera in self.cameras if camera.encoders]
+        doubts = [words for camera, zoom in zooms if zoom for words in zoom.doubts(camera)]
+        return [*(words for camera in self.cameras for words in lens_warnings(camera)), *doubts]
 
     @property
     def poses_and_lenses(self) -> list[PosedCamera]:

@@ -82,7 +82,7 @@ def with_refined_poses(venue: Venue, refined: dict[str, Refined], camera: str | 
 
 
 def _numbered_cameras(venue: Venue, camera: str | None) -> list[NumberedCamera]:
-    shots = [NumberedCamera(each, number) for number, each in enumerate(venue.cameras, start=1)]
+    shots = [NumberedCamera(each, number, each.encoders) for number, each in enumerate(venue.cameras, start=1)]
     chosen = [shot for shot in shots if camera in (None, shot.id)]
     if not chosen:
         ids = [shot.id for shot in shots]

@@ -4,6 +4,7 @@ import io
 import json
 import tomllib
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -15,6 +16,7 @@ from service.formats import colmap, freed, metropolis, mrcal, opencv, opentracki
 from service.formats.lens import NumberedCamera
 from service.formats.parsing import parse_file
 from service.formats.table import FILE_FORMATS
+from service.schemas.encoders import LensEncoders
 from service.schemas.names import PANORAMAS
 from service.schemas.problems import Problem
 from service.schemas.venue import Camera
@@ -154,7 +156,7 @@ def read_freed(packet):
     assert len(packet) == 29
     assert packet[0] == 0xD1
     assert sum(packet) % 256 == 0x40
-    numbers = [int.from_bytes(packet[at : at + 3], "big", signed=True) for at in range(2, 26, 3)]
+    numbers = [int.from_bytes(packet[at : at + 3], "big", signed=at < 20) for at in range(2, 26, 3)]
     return packet[1], np.array(numbers[:3]) / 32768, np.array(numbers[3:6]) / 64 / 1000, numbers[6:]
 
 
@@ -176,10 +178,25 @@ def test_freed_is_a_packet_per_camera_with_its_number():
     assert read_freed(packets[:29])[3] == [0, 0]
 
 
-def test_freed_has_the_counts_of_zoom_and_focus_that_are_given():
-    counts = {"camera-1": freed.EncoderCounts(zoom=0x010203, focus=0x7FFFFF)}
-    packets = freed.write([shot(number=1), shot(number=7)], "x y z pan tilt roll", counts)
-    assert [read_freed(packets[at : at + 29])[3] for at in (0, 29)] == [[0x010203, 0x7FFFFF], [0, 0]]
+def counts_of_freed(camera, zoom, focus):
+    """Counts of zoom and focus in the packet of a camera whose tables of encoders have these pairs."""
+    encoders = LensEncoders(
+        zoom={"sensor_width_mm": 9.6, "counts": zoom}, focus={"distance_m": 60, "counts": focus} if focus else None
+    )
+    return read_freed(freed.write([replace(camera, encoders=encoders)], "x y z pan tilt roll"))[3]
+
+
+@pytest.mark.parametrize("focal", [1500.0, 2122.4, 5000.0])
+def test_counts_of_freed_lie_on_the_tables_of_the_lens(focal):
+    zoom, focus = [[5, 70], [6, 20000], [12, 65535]], [[0.8, 0x7FFFFF], [100, 12]]
+    mm = focal * 9.6 / 3072
+    expected = [np.interp(at, *zip(*table, strict=True)) for at, table in ((mm, zoom), (60, focus))]
+    assert counts_of_freed(shot(focal=(focal, focal)), zoom, focus) == pytest.approx(expected, abs=0.5)
+
+
+def test_a_zoom_beyond_its_table_has_the_count_of_the_nearest_end_and_a_focus_without_one_0():
+    ends = [counts_of_freed(shot(), table, None) for table in ([[7, 11], [9, 99]], [[3, 11], [6, 0xFFFFFF]])]
+    assert ends == [[11, 0], [0xFFFFFF, 0]]
 
 
 def test_pan_of_freed_is_the_opposite_of_that_of_opentrackio():

@@ -19,6 +19,7 @@ from service.live import host_lookup
 from service.live.destinations import FreeD, JsonLines, OpenTrackIO, PoseSender, UdpSocket
 from service.live.host_lookup import HostLookup
 from service.live.stored_poses import StoredPoses, send_stored_poses
+from service.schemas.encoders import LensEncoders
 from service.schemas.geometry import Pose
 from service.schemas.venue import VenueIn
 from tests.service.live.receiving import freed_packet, listening, opentrackio_sample, port_of
@@ -121,6 +122,25 @@ def test_packets_of_freed_say_the_stored_places(udp):
     for (number, _, place), camera in zip(packets, venue.cameras, strict=True):
         assert venue.cameras[number - 1].id == camera.id
         assert place == pytest.approx(camera.pose.position, abs=1e-4)
+
+
+def test_the_counts_of_freed_follow_the_focal_length_of_newer_poses(udp):
+    venue = demo()
+    camera = venue.cameras[0]
+    focal_mm = camera.intrinsics.matrix[0][0] * 9.6 / camera.image_size[0]
+    encoders = {"zoom": {"sensor_width_mm": 9.6, "counts": [[0.9 * focal_mm, 1000], [1.1 * focal_mm, 3000]]}}
+    longer = [[1.05 * value for value in row] for row in camera.intrinsics.matrix[:2]] + [[0, 0, 1]]
+    zoomed = venue.with_cameras({camera.id: {"intrinsics": camera.intrinsics.model_copy(update={"matrix": longer})}})
+    counts = []
+    for now in (venue, zoomed):
+        with listening() as opened:
+            freed = FreeD(
+                udp, "127.0.0.1", port_of(opened), "x y z pan tilt roll", {camera.id: LensEncoders(**encoders)}
+            )
+            with Sending([freed], StoredPoses(now)):
+                packets = [opened.recv(64) for _ in venue.cameras]
+        counts += [int.from_bytes(packet[20:23], "big") for packet in packets]
+    assert counts == [2000, 0, 2500, 0]
 
 
 def test_lines_of_json_count_the_moments():

@@ -51,6 +51,15 @@ def test_the_number_of_a_camera_stays_when_it_is_asked_for_alone(service, name):
     assert (both[1], both[30], right) == (1, 2, both[29:])
 
 
+def test_a_table_of_the_lens_is_stored_and_counts_in_packets_of_freed(service, name):
+    service.venue(name)
+    encoders = {"focus": {"distance_m": 30, "counts": [[20, 1000], [40, 3000]]}, "zoom": None}
+    patched = service.http.patch(f"/venues/{name}", json={"cameras": {"left": {"encoders": encoders}}})
+    assert (patched.status_code, patched.json()["cameras"][0]["encoders"]) == (200, encoders)
+    left, right = (poses(service, f"/venues/{name}", "freed", camera=camera).content for camera in ("left", "right"))
+    assert (left[23:26], right[20:26]) == ((2000).to_bytes(3, "big"), bytes(6))
+
+
 def test_st_maps_are_made_for_one_camera(service, name, tmp_path):
     service.venue(name)
     which = poses(service, f"/venues/{name}", "st-map").json()

@@ -40,6 +40,33 @@ def test_cameras_have_names_of_their_own():
         VenueIn.model_validate(document)
 
 
+def with_zoom_counts(*counts):
+    encoders = {"zoom": {"sensor_width_mm": 9.6, "counts": [*counts]}}
+    return VENUE_EXAMPLE | {"cameras": [VENUE_EXAMPLE["cameras"][0] | {"encoders": encoders}]}
+
+
+@pytest.mark.parametrize(
+    ("counts", "words"),
+    [
+        ([[20, 0], [8, 9]], "sorted by their first numbers, each once: 8 follows 20"),
+        ([[8, 0], [8, 9]], "sorted by their first numbers, each once: 8 follows 8"),
+        ([[8, 0.5]], "counts are whole numbers, came 0.5"),
+        ([[8, 2**24]], "less than or equal to 16777215"),
+        ([], "at least 1"),
+    ],
+)
+def test_counts_of_an_encoder_that_are_no_table_are_refused(counts, words):
+    with pytest.raises(ValidationError, match=words):
+        VenueIn.model_validate(with_zoom_counts(*counts))
+
+
+def test_a_focal_length_that_is_not_in_the_table_of_the_zoom_is_warned_about():
+    inside, outside = (with_zoom_counts([low, 0], [20, 65535]) for low in (6, 7))
+    assert VenueIn.model_validate(inside).to_venue().lens_warnings == []
+    (warning,) = VenueIn.model_validate(outside).to_venue().lens_warnings
+    assert "6.633 mm, and the counts of its zoom go from 7 to 20 mm: check sensor_width_mm" in warning
+
+
 def ignoring(*polygons):
     return VENUE_EXAMPLE | {"cameras": [VENUE_EXAMPLE["cameras"][0] | {"ignore": list(polygons)}]}
 
