@@ -57,7 +57,7 @@ def test_the_documented_commands_install_the_extras_of_the_wheel(tmp_path):
     built(tmp_path, copied(tmp_path / "source"))
     pages = [ROOT / "docker" / "README.md", *(ROOT / "docs").glob("*.md")]
     commands = {one for page in pages for one in re.findall(r"pip install '(\./[^']+\.whl\[\w+\])'", page.read_text())}
-    assert {re.search(r"\[(\w+)\]", one)[1] for one in commands} == {"exr", "tracing", "video", "mqtt", "mcp"}
+    assert {re.search(r"\[(\w+)\]", one)[1] for one in commands} == {"cbor", "exr", "tracing", "video", "mqtt", "mcp"}
     for one in commands:
         pip = [sys.executable, "-m", "pip", "install", "--dry-run", "--no-index", one]
         said = subprocess.run(pip, cwd=tmp_path, capture_output=True, text=True)

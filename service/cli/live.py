@@ -8,12 +8,14 @@ import threading
 import time
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated
 
 import httpx
 import typer
 
+from service import build
 from service.cli.answers import outcome_text
 from service.cli.arguments import (
     DEFAULT_URL,
@@ -24,11 +26,12 @@ from service.cli.arguments import (
     parse_frame_rate,
     require_cameras,
 )
-from service.cli.printing import USAGE, OngoingTrouble, fail, print_note
+from service.cli.printing import FAILED, USAGE, OngoingTrouble, fail, print_note
 from service.cli.service_client import load_venue
 from service.cli.service_settings import load_settings
 from service.cli.tracked_streams import TrackedStreams
 from service.client import Client, NotUnderstood, Refused
+from service.formats.opentrackio import ClockSource
 from service.live.destinations import (
     OPENTRACKIO_PORT,
     Destination,
@@ -38,6 +41,7 @@ from service.live.destinations import (
     PoseSender,
     UdpSocket,
 )
+from service.live.packets import CBOR, JSON
 from service.live.recovery import Recovery
 from service.live.reports import LiveReporter
 from service.live.stored_poses import StoredPoses, send_stored_poses
@@ -97,6 +101,13 @@ def live(
             "where no destination is given.",
         ),
     ] = None,
+    cbor: Annotated[
+        bool, typer.Option("--cbor", help="Send OpenTrackIO as CBOR, in fewer bytes than JSON. Needs the extra `cbor`.")
+    ] = False,
+    clock: Annotated[
+        ClockSource,
+        typer.Option("--clock", help="Source that the clock of this machine follows, as samples of OpenTrackIO say."),
+    ] = "ntp",
     freed: Annotated[
         list[str] | None, typer.Option("--freed", metavar="HOST:PORT", help="Send FreeD D1 packets there.")
     ] = None,
@@ -148,18 +159,21 @@ def live(
     zooms, focuses = _parse_counts(zoom or [], "--zoom"), _parse_counts(focus or [], "--focus")
     if (zooms or focuses) and not freed:
         fail("--zoom and --focus are sent by FreeD alone: add --freed HOST:PORT", USAGE)
+    if cbor and find_spec("cbor2") is None:
+        fail(f"--cbor needs the extra `cbor`: {build.install_command('cbor', sys.executable)}", FAILED)
     if not (opentrackio or freed or as_json):
         opentrackio = [MULTICAST]
-    trackers = [
-        (to, () if to == MULTICAST else _parse_address(to, "--opentrackio", OPENTRACKIO_PORT))
+    trackers: list[tuple[str, tuple[str | None, int]]] = [
+        (to, (None, OPENTRACKIO_PORT) if to == MULTICAST else _parse_address(to, "--opentrackio", OPENTRACKIO_PORT))
         for to in opentrackio or []
     ]
     renderers = [(to, _parse_address(to, "--freed", None)) for to in freed or []]
     with UdpSocket(interface) as socket:
         stored = load_venue(venue, url, api_key)
         require_cameras(stored, [*zooms, *focuses])
+        encoding = CBOR if cbor else JSON
         destinations: dict[str, Destination] = {
-            f"opentrackio {name}": OpenTrackIO(socket, *to) for name, to in trackers
+            f"opentrackio {name}": OpenTrackIO(socket, *to, encoding) for name, to in trackers
         }
         encoders = {camera.id: _with_counts(camera, zooms, focuses) for camera in stored.cameras}
         axes = load_settings().freed_axes if renderers else ""
@@ -167,12 +181,14 @@ def live(
         if as_json:
             destinations["json"] = JsonLines(sys.stdout)
         service = None if Path(venue).is_file() else (url, api_key)
-        _send(stored, destinations, sample_rate, addresses, follow_every, predict / 1000, service, recover=recover)
+        ahead_s = predict / 1000
+        _send(stored, destinations, clock, sample_rate, addresses, follow_every, ahead_s, service, recover=recover)
 
 
 def _send(
     stored: Venue,
     destinations: Mapping[str, Destination],
+    clock: ClockSource,
     sample_rate: Fraction,
     addresses: Mapping[str, str],
     every: int,
@@ -198,7 +214,7 @@ def _send(
         unread.set()
         stop.set()
 
-    sender = PoseSender(destinations, note_delivery, end_unread)
+    sender = PoseSender(destinations, note_delivery, end_unread, clock)
     reporter = LiveReporter(poses, addresses, [*destinations])
     streams = TrackedStreams.of(stored, addresses, every, ahead_s, sender, reporter.sent)
     for number in (signal.SIGTERM, signal.SIGINT):

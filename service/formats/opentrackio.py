@@ -12,7 +12,7 @@ import math
 import uuid
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import Any
+from typing import Any, Literal
 
 from service.formats.lens import RADIAL, TANGENTIAL, NumberedCamera
 from service.formats.nodes import Node
@@ -31,21 +31,26 @@ SEQUENCE_NUMBERS = 2**32
 SOURCES = uuid.UUID("3d6b2a0e-7f3c-5c8f-9d2b-52b8f4a7c1e6")
 
 
+# Sources of the time of a clock that no video signal triggers.
+ClockSource = Literal["ntp", "ptp"]
 # A venue knows its cameras by their ids alone, and Unreal 5.7 shows none of which one of the three is missing.
 UNKNOWN = "unknown"
 
 
 @dataclass(frozen=True)
 class SampleTime:
-    """Time of a sample of a stream: `unix_ns` by the clock of the machine, and the `number` of the sample from 0.
+    """Time of a sample of a stream: `unix_ns` by the machine's or the camera's clock, and its `number` from 0.
 
-    `rate`: samples a second; `status`: that of the tracking.
+    `rate`: samples a second; `status`: that of the tracking; `is_locked`: True if the clock follows `clock_source`;
+    None: unknown.
     """
 
     unix_ns: int
     number: int
     rate: Fraction
     status: str
+    is_locked: bool | None = None
+    clock_source: ClockSource = "ntp"
 
 
 @dataclass(frozen=True)
@@ -99,8 +104,8 @@ def write_frame(shot: NumberedCamera, frame: Frame, angles: SteadyAngles) -> byt
     return (json.dumps(_with_sample_id(_sample(shot, angles.of(shot)) | moment), separators=(",", ":")) + "\n").encode()
 
 
-def write_moment(shot: NumberedCamera, moment: SampleTime, angles: SteadyAngles) -> bytes:
-    """Return a sample of a stream, compact JSON. Its timestamp is UTC in seconds since 1970 by the sender's clock."""
+def moment_sample(shot: NumberedCamera, moment: SampleTime, angles: SteadyAngles) -> dict[str, Any]:
+    """Return a sample of a stream. Its timestamp is UTC in seconds since 1970 by the clock of the moment."""
     seconds, nanoseconds = divmod(moment.unix_ns, 1_000_000_000)
     timing = {
         "tracker": {"status": moment.status},
@@ -109,10 +114,21 @@ def write_moment(shot: NumberedCamera, moment: SampleTime, angles: SteadyAngles)
             "sampleRate": _rational(moment.rate),
             "sampleTimestamp": {"seconds": seconds, "nanoseconds": nanoseconds},
             "sequenceNumber": moment.number % SEQUENCE_NUMBERS,
+            **_synchronization(moment),
         },
     }
-    sample = _sample(shot, angles.of(shot)) | timing
-    return json.dumps(_with_sample_id(sample), separators=(",", ":")).encode()
+    return _with_sample_id(_sample(shot, angles.of(shot)) | timing)
+
+
+def _synchronization(moment: SampleTime) -> dict[str, Any]:
+    """Return how the clock of a moment is synchronised, empty if nobody knows.
+
+    A source to which no clock is locked may be there or not.
+    """
+    if moment.is_locked is None:
+        return {}
+    locked = {"locked": True, "present": True} if moment.is_locked else {"locked": False}
+    return {"synchronization": {"source": moment.clock_source, **locked}}
 
 
 def _sample(shot: NumberedCamera, angles: tuple[float, float, float]) -> dict[str, Any]:

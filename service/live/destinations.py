@@ -16,7 +16,8 @@ from typing import IO, Protocol, Self
 from service.formats import freed, opentrackio
 from service.formats.lens import NumberedCamera
 from service.live.host_lookup import HostLookup
-from service.live.packets import datagrams
+from service.live.machine_clock import is_clock_locked
+from service.live.packets import JSON, Encoding, datagrams
 from service.schemas.encoders import LensEncoders
 from service.schemas.live import LiveClock
 
@@ -117,14 +118,15 @@ class OpenTrackIO:
     socket: UdpSocket
     host: str | None = None
     port: int = OPENTRACKIO_PORT
+    encoding: Encoding = JSON
     _angles: opentrackio.SteadyAngles = field(default_factory=opentrackio.SteadyAngles, init=False)
 
     def send(self, samples: Sequence[Sample]) -> None:
         """Send a sample of each camera, split into datagrams."""
         for sample in samples:
             host = self.host or OPENTRACKIO_GROUP.format(number=sample.shot.number)
-            content = opentrackio.write_moment(sample.shot, sample.moment, self._angles)
-            for datagram in datagrams(content, sample.moment.number):
+            content = opentrackio.moment_sample(sample.shot, sample.moment, self._angles)
+            for datagram in datagrams(content, sample.moment.number, self.encoding):
                 self.socket.send(datagram, host, self.port)
 
 
@@ -186,10 +188,12 @@ class PoseSender:
         destinations: Mapping[str, Destination],
         report: Callable[[str, OSError | None], None],
         ended: Callable[[], None],
+        clock_source: opentrackio.ClockSource = "ntp",
     ) -> None:
         self._destinations = dict(destinations)
         self._report = report
         self._ended = ended
+        self._clock_source = clock_source
         self._numbers = Counter[str]()
         self._lock = threading.Lock()
 
@@ -202,11 +206,14 @@ class PoseSender:
         tracked: Tracked | None = None,
     ) -> None:
         """Send a sample of each of these cameras; other arguments: see `SampleTime` and `Sample`."""
+        # Cameras do not say what their own clocks follow.
+        is_locked = None if tracked is not None and tracked.clock == "rtcp" else is_clock_locked()
         with self._lock:
-            samples = [
-                Sample(shot, opentrackio.SampleTime(unix_ns, self._numbers[shot.id], rate, status), tracked)
+            moments = [
+                opentrackio.SampleTime(unix_ns, self._numbers[shot.id], rate, status, is_locked, self._clock_source)
                 for shot in shots
             ]
+            samples = [Sample(shot, moment, tracked) for shot, moment in zip(shots, moments, strict=True)]
             self._numbers.update(shot.id for shot in shots)
             for name in [*self._destinations]:
                 self._send_to(name, samples)

@@ -5,6 +5,10 @@ import socket
 import struct
 from contextlib import contextmanager
 
+import cbor2
+
+DECODERS = {1: json.loads, 2: cbor2.loads}
+
 
 @contextmanager
 def listening(family=socket.AF_INET):
@@ -27,12 +31,12 @@ def checksum(data):
 
 
 def opentrackio_sample(receive):
-    """The next whole sample of OpenTrackIO: its sequence number and what its JSON says."""
+    """The next whole sample of OpenTrackIO: its sequence number and what its JSON or CBOR says."""
     parts, sequence, ends_at = {}, None, None
     while ends_at is None or sum(map(len, parts.values())) < ends_at:
         datagram = receive()
         identifier, reserved, encoding, number, offset, length = struct.unpack(">4sBBHIH", datagram[:14])
-        assert (identifier, reserved, encoding) == (b"OTrk", 0, 1)
+        assert (identifier, reserved, encoding in DECODERS) == (b"OTrk", 0, True)
         assert struct.unpack(">H", datagram[14:16])[0] == checksum(datagram[:14] + datagram[16:])
         assert length & 0x7FFF == len(datagram) - 16
         assert len(datagram) <= 1472, "larger datagrams are broken up on Ethernet"
@@ -41,7 +45,7 @@ def opentrackio_sample(receive):
         parts[offset] = datagram[16:]
         if length & 0x8000:
             ends_at = offset + len(datagram) - 16
-    return sequence, json.loads(b"".join(parts[offset] for offset in sorted(parts)))
+    return sequence, DECODERS[encoding](b"".join(parts[offset] for offset in sorted(parts)))
 
 
 def freed_packet(datagram):

@@ -8,8 +8,7 @@ from tests.service.live.receiving import checksum, opentrackio_sample
 
 
 def test_a_sample_of_several_datagrams_is_put_together_again_in_any_order():
-    content = b'{"text":"' + b"x" * 5000 + b'"}'
-    sent = list(datagrams(content, 7))
+    sent = list(datagrams({"text": "x" * 5000}, 7))
     assert len(sent) == 4
     waiting = iter(reversed(sent))
     sequence, sample = opentrackio_sample(lambda: next(waiting))
@@ -17,7 +16,7 @@ def test_a_sample_of_several_datagrams_is_put_together_again_in_any_order():
 
 
 def test_a_small_sample_is_one_datagram_that_says_it_is_the_last():
-    (only,) = datagrams(b"{}", 65536 + 3)
+    (only,) = datagrams({}, 65536 + 3)
     assert only[:6] == b"OTrk\x00\x01"
     assert only[6:8] == (3).to_bytes(2, "big"), "sequence numbers begin anew"
     assert only[12:14] == (0x8000 | 2).to_bytes(2, "big")

@@ -11,13 +11,18 @@ from contextlib import suppress
 from fractions import Fraction
 from io import StringIO
 from pathlib import Path
+from types import SimpleNamespace
 
 import jsonschema_rs
 import pytest
 
+from service.formats import opentrackio
+from service.formats.lens import NumberedCamera
 from service.live import host_lookup
-from service.live.destinations import FreeD, JsonLines, OpenTrackIO, PoseSender, UdpSocket
+from service.live.destinations import FreeD, JsonLines, OpenTrackIO, PoseSender, Tracked, UdpSocket
 from service.live.host_lookup import HostLookup
+from service.live.machine_clock import is_clock_locked
+from service.live.packets import CBOR, JSON, datagrams
 from service.live.stored_poses import StoredPoses, send_stored_poses
 from service.schemas.encoders import LensEncoders
 from service.schemas.geometry import Pose
@@ -80,8 +85,9 @@ class Sending:
         return not self._thread.is_alive()
 
 
-def test_samples_hold_to_the_schema_and_have_all_that_unreal_asks_of_a_camera(udp):
-    with listening() as opened, Sending([OpenTrackIO(udp, "127.0.0.1", port_of(opened))]):
+@pytest.mark.parametrize("encoding", [JSON, CBOR], ids=["json", "cbor"])
+def test_samples_hold_to_the_schema_and_have_all_that_unreal_asks_of_a_camera(udp, encoding):
+    with listening() as opened, Sending([OpenTrackIO(udp, "127.0.0.1", port_of(opened), encoding=encoding)]):
         samples = [opentrackio_sample(lambda: opened.recv(65536)) for _ in range(4)]
     validator = jsonschema_rs.Draft202012Validator(SCHEMA)
     for _, sample in samples:
@@ -101,6 +107,45 @@ def test_the_time_of_a_sample_is_that_of_the_clock(udp):
         now = time.time()
     stamp = sample["timing"]["sampleTimestamp"]
     assert abs(stamp["seconds"] + stamp["nanoseconds"] / 1e9 - now) < 5
+
+
+def test_samples_as_cbor_say_the_same_as_json_in_one_datagram():
+    shot = NumberedCamera(demo().cameras[0], 1)
+    moment = opentrackio.SampleTime(1_800_000_000_123_456_789, 2**32 + 5, Fraction(30000, 1001), "stored", True)
+    sample = opentrackio.moment_sample(shot, moment, opentrackio.SteadyAngles())
+    sent = [[*datagrams(sample, 3, encoding)] for encoding in (JSON, CBOR)]
+    of_json, of_cbor = (opentrackio_sample(iter(one).__next__) for one in sent)
+    assert of_json == of_cbor == (3, sample)
+    assert (sent[1][0][5], len(sent[1])) == (2, 1)
+
+
+@pytest.mark.parametrize(
+    ("is_locked", "source", "expected"),
+    [
+        (True, "ntp", {"source": "ntp", "locked": True, "present": True}),
+        (True, "ptp", {"source": "ptp", "locked": True, "present": True}),
+        (False, "ntp", {"source": "ntp", "locked": False}),
+        (None, "ntp", None),
+    ],
+)
+def test_a_sample_says_if_the_machine_holds_its_clock_to_another(monkeypatch, is_locked, source, expected):
+    sent = []
+    monkeypatch.setattr("service.live.destinations.is_clock_locked", lambda: is_locked)
+    destination = SimpleNamespace(send=sent.extend)
+    PoseSender({"one": destination}, lambda *_: None, lambda: None, source).send(
+        [NumberedCamera(demo().cameras[0], 1)], time.time_ns(), FASTEST, "stored"
+    )
+    sample = opentrackio.moment_sample(sent[0].shot, sent[0].moment, opentrackio.SteadyAngles())
+    jsonschema.Draft202012Validator(SCHEMA).validate(sample)
+    assert sample["timing"].get("synchronization") == expected
+
+
+def test_a_sample_by_the_clock_of_a_camera_does_not_say_what_that_follows():
+    sent = []
+    sender = PoseSender({"one": SimpleNamespace(send=sent.extend)}, lambda *_: None, lambda: None)
+    for clock in ("rtcp", "arrival"):
+        sender.send([NumberedCamera(demo().cameras[0], 1)], 0, FASTEST, "measured", Tracked(0.1, 0.1, clock, 0))
+    assert [one.moment.is_locked for one in sent] == [None, is_clock_locked()]
 
 
 def test_a_camera_goes_to_the_multicast_group_of_its_number():
