@@ -37,6 +37,7 @@ from service.client_errors import is_passing, pause_s_of, refusal
 from service.schemas.base import TOLERANTLY
 from service.schemas.events.venue_event import EVENT_TYPES, FINAL_EVENT, Event
 from service.schemas.find import SoughtSite
+from service.schemas.geometry import PictureMotion
 from service.schemas.health import VenueHealth
 from service.schemas.history import History, Revision
 from service.schemas.job import Job, Jobs
@@ -141,6 +142,11 @@ class AsyncClient:
     async def venue_health(self, venue_id: str) -> VenueHealth:
         """Return the alarms of a venue, the drift of its cameras and its schedule."""
         return await self._call(VenueHealth, "GET", f"/venues/{venue_id}/health")
+
+    async def picture_motion(self, venue_id: str, camera: str, since: int) -> PictureMotion:
+        """Return how the picture of a camera has moved since a revision."""
+        address = f"/venues/{venue_id}/cameras/{camera}/picture-motion"
+        return await self._call(PictureMotion, "GET", address, params={"since": since})
 
     async def history(self, venue_id: str, most: int | None = None) -> list[Revision]:
         """Return the changes of a venue's poses, newest first; `most`: so many of them."""

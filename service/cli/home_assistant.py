@@ -36,6 +36,10 @@ class Topics:
         """Return the topic of the state of a venue; of all venues for `+`."""
         return f"{self.base}/{venue_id}/state"
 
+    def picture_motion(self, venue_id: str, camera: str) -> str:
+        """Return the topic of the last motion of a camera's picture; of all of them for `+`."""
+        return f"{self.base}/{venue_id}/cameras/{camera}/picture-motion"
+
     def calibrate(self, venue_id: str) -> str:
         """Return the topic by which a venue is calibrated; of all venues for `+`."""
         return f"{self.base}/{venue_id}/calibrate"

@@ -49,7 +49,8 @@ def mqtt(
     """Publish venues to an MQTT broker until stopped: each is a device of Home Assistant. Needs the extra `mqtt`.
 
     A device has the stitch error, the drift, the time of the last accepted poses and the alarms; and where every camera
-    has a source a button that calibrates, which needs a key of scope `calibrate`.
+    has a source a button that calibrates, which needs a key of scope `calibrate`. Beside it a topic for each camera has
+    the homographies by which its picture moved at the last new poses.
     """
     if find_spec("aiomqtt") is None:
         fail(f"MQTT needs the extra `mqtt`: {build.install_command('mqtt', sys.executable)}", FAILED)

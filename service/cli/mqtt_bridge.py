@@ -1,8 +1,10 @@
 """The bridge from a service to an MQTT broker: venues are published, and calibrated where a button is pressed."""
 
 import asyncio
+from collections import defaultdict
 from collections.abc import Awaitable, Callable
 from contextlib import aclosing, suppress
+from functools import partial
 from http import HTTPStatus
 from typing import TypeVar
 
@@ -13,6 +15,7 @@ from service.cli.home_assistant import PRESS, Topics, discovery_of, state_of
 from service.cli.printing import OngoingTrouble, print_note
 from service.client import PATIENCE_S, AsyncClient, Refused
 from service.client_errors import is_passing, pause_s_of
+from service.schemas.events.venue_event import PosesEvent
 
 # Every message arrives at least once, and is kept for who subscribes later.
 QOS = 1
@@ -58,6 +61,8 @@ class Bridge:
     def __init__(self, broker: aiomqtt.Client, service: tuple[str, str | None], topics: Topics) -> None:
         self._broker, self._service, self._topics = broker, service, topics
         self._followed: set[str] = set()
+        # Cameras of venues whose motion is published.
+        self._moved: defaultdict[str, set[str]] = defaultdict(set)
         self._trouble = OngoingTrouble()
 
     async def run(self, note_connection: Callable[[], None]) -> None:
@@ -85,8 +90,10 @@ class Bridge:
                 AsyncClient(*self._service) as client,
                 aclosing(client.venue_events(venue_id, patience_s=PATIENCE_S)) as events,
             ):
-                async for _ in events:
+                async for _, event in events:
                     await self._publish(client, venue_id)
+                    if isinstance(event, PosesEvent):
+                        await self._publish_motions(client, event)
             await self._take_back(venue_id)
         except Refused as refused:
             if refused.busy or refused.status in NO_ACCESS:
@@ -104,10 +111,28 @@ class Bridge:
         await self._retain(self._topics.config(venue_id), discovery_of(venue, self._topics, page))
         await self._retain(self._topics.state(venue_id), state_of(health))
 
+    async def _publish_motions(self, client: AsyncClient, event: PosesEvent) -> None:
+        """Publish how the pictures of a venue's cameras moved since the revision before the poses of an event."""
+        poses, motions = event.data, event.data.picture_motions
+        if event.type == "poses.current" and poses.revision > 1:
+            motions = {}
+            for camera in poses.cameras:
+                ask = partial(client.picture_motion, poses.venue, camera.id, poses.revision - 1)
+                # A camera may be new, and a revision gone.
+                with suppress(Refused):
+                    motions[camera.id] = await _when_admitted(ask)
+        for camera_id, motion in motions.items():
+            self._moved[poses.venue].add(camera_id)
+            await self._retain(self._topics.picture_motion(poses.venue, camera_id), motion.model_dump_json())
+        for camera_id in self._moved[poses.venue] - {camera.id for camera in poses.cameras}:
+            await self._retain(self._topics.picture_motion(poses.venue, camera_id), "")
+
     async def _take_back(self, venue_id: str) -> None:
         """Remove a venue from the broker, and so from Home Assistant."""
         await self._retain(self._topics.config(venue_id), "")
         await self._retain(self._topics.state(venue_id), "")
+        for camera_id in self._moved.pop(venue_id, ()):
+            await self._retain(self._topics.picture_motion(venue_id, camera_id), "")
 
     async def _retain(self, topic: str, payload: str) -> None:
         await self._broker.publish(topic, payload, QOS, retain=True)
@@ -115,11 +140,12 @@ class Bridge:
 
     async def _take_messages(self, client: AsyncClient, tasks: asyncio.TaskGroup) -> None:
         states, commands = self._topics.state("+"), self._topics.calibrate("+")
-        for topic in (states, commands, self._topics.birth):
+        motions = self._topics.picture_motion("+", "+")
+        for topic in (states, motions, commands, self._topics.birth):
             await self._broker.subscribe(topic, QOS)
         _raise_if_cancelled()
         async for message in self._broker.messages:
-            venue_id = message.topic.value.split("/")[-2]
+            venue_id = message.topic.value.split("/")[1]
             if message.topic.matches(commands):
                 # A command that the broker keeps would be obeyed at every connection.
                 if message.payload == PRESS.encode() and not message.retain:
@@ -128,6 +154,9 @@ class Bridge:
                 # The broker still has a venue that was deleted while this program was away.
                 if message.retain and venue_id not in self._followed:
                     await self._take_back(venue_id)
+            elif message.topic.matches(motions):
+                if message.retain and venue_id not in self._followed:
+                    await self._retain(message.topic.value, "")
             elif message.payload == ONLINE.encode():
                 for one in sorted(self._followed):
                     with suppress(Refused):

@@ -252,9 +252,7 @@ def get_picture_motion(
 
     before, venue, revision = context.venues.states_since(venue_id, since)
     then, now = camera_of(before, camera), camera_of(venue, camera)
-    homographies = picture_motion(venue.field, then, now)
-    motion = PictureMotion(since=since, revision=revision, image_size=now.image_size, **homographies)
-    return tagged_json(motion, if_none_match)
+    return tagged_json(picture_motion(venue.field, (since, then), (revision, now)), if_none_match)
 
 
 @router.get("/{venue_id}/health", openapi_extra=needs_scope("read"))

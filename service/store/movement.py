@@ -8,7 +8,6 @@ movement is wanted.
 import math
 from functools import lru_cache
 from itertools import pairwise
-from typing import Any
 
 import cv2
 import numpy as np
@@ -16,7 +15,7 @@ from numpy.typing import NDArray
 
 from fields.shapes import Arc, Line, Shape, Spot
 from service.schemas.field import FieldOfPlay
-from service.schemas.geometry import Intrinsics, Moved, PosedCamera
+from service.schemas.geometry import Intrinsics, Moved, PictureMotion, PosedCamera
 from service.schemas.names import PANORAMAS, LensModel
 
 Array = NDArray[np.float64]
@@ -52,8 +51,9 @@ def _rotation(camera: PosedCamera) -> Array:
     return np.asarray(cv2.Rodrigues(np.array(camera.pose.rotation, dtype=float))[0], dtype=float)
 
 
-def picture_motion(field: FieldOfPlay, before: PosedCamera, after: PosedCamera) -> dict[str, Any]:
-    """Return the homographies of `PictureMotion` from the picture of one state to that of another, and residuals."""
+def picture_motion(field: FieldOfPlay, then: tuple[int, PosedCamera], now: tuple[int, PosedCamera]) -> PictureMotion:
+    """Return how the picture of a camera moved from one revision (its number, the camera) to another."""
+    (since, before), (revision, after) = then, now
     half = np.array([field.length_m, field.width_m]) / 2 + BESIDE_M
     steps = [np.linspace(-side, side, GRID) for side in half]
     ground = np.stack(np.meshgrid(*steps), axis=-1).reshape(-1, 2)
@@ -64,12 +64,15 @@ def picture_motion(field: FieldOfPlay, before: PosedCamera, after: PosedCamera) 
     rays = np.stack([*sides, np.ones_like(sides[0])], axis=-1).reshape(-1, 3)
     turn = _rotation(after) @ _rotation(before).T
     far = _homography(before, _seen(before, rays), after, _seen(after, rays @ turn.T))
-    return {
-        "ground": None if on_ground is None else on_ground[0],
-        "ground_residual_px": None if on_ground is None else on_ground[1],
-        "far": None if far is None else far[0],
-        "far_residual_px": None if far is None else far[1],
-    }
+    return PictureMotion(
+        since=since,
+        revision=revision,
+        image_size=after.image_size,
+        ground=None if on_ground is None else on_ground[0],
+        ground_residual_px=None if on_ground is None else on_ground[1],
+        far=None if far is None else far[0],
+        far_residual_px=None if far is None else far[1],
+    )
 
 
 def _homography(

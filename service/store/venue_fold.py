@@ -15,7 +15,7 @@ from service.schemas.base import TOLERANTLY
 from service.schemas.events.venue_event import Poses
 from service.schemas.field import FieldOfPlay
 from service.schemas.findings import describe_errors
-from service.schemas.geometry import Movement, PosedCamera
+from service.schemas.geometry import Movement, PictureMotion, PosedCamera
 from service.schemas.health import CalibrationEnd
 from service.schemas.history import Cause, Revision
 from service.schemas.names import JobStatus
@@ -271,6 +271,7 @@ def with_revision(
         ridge=venue.field.ridge,
         cameras=[camera.posed for camera in venue.cameras],
         changed=changed,
+        picture_motions={} if state.newest is None else _picture_motions(state.newest.number, last, venue, changed),
     )
     drifts = [movement.drift.pixels for movement in movements.values() if movement.drift]
     changes = replace(changes.with_state(newest=row), memories=memories)
@@ -286,6 +287,17 @@ def with_revision(
 def _is_replaced(camera: Camera, last: Mapping[str, PosedCamera]) -> bool:
     """True if a camera has another pose or lens than it had last."""
     return camera.id not in last or last[camera.id].pose_and_lens != camera.posed.pose_and_lens
+
+
+def _picture_motions(
+    since: int, last: Mapping[str, PosedCamera], venue: Venue, changed: Collection[str]
+) -> dict[str, PictureMotion]:
+    """Return how the pictures of `changed` cameras moved in the revision after `since`, whose cameras are `last`."""
+    # Loads OpenCV, for which neither a command nor the start of a service waits.
+    from service.store.movement import picture_motion
+
+    moved = [camera for camera in venue.cameras if camera.id in changed and camera.id in last]
+    return {camera.id: picture_motion(venue.field, (since, last[camera.id]), (since + 1, camera)) for camera in moved}
 
 
 def _number_changes(before: FieldOfPlay, after: FieldOfPlay) -> dict[str, dict[str, float]]:

@@ -7,8 +7,8 @@ from typing import Annotated, Literal, get_args
 from pydantic import Field
 
 from service.schemas.actor import Attributed
-from service.schemas.base import OPEN_WORD, Id, OpenChoice, Schema
-from service.schemas.geometry import PosedCamera, Row
+from service.schemas.base import OPEN_WORD, Id, OpenChoice, Schema, is_empty
+from service.schemas.geometry import PictureMotion, PosedCamera, Row
 from service.schemas.health import AlarmEvent
 from service.schemas.history import CAUSES, Cause
 from service.schemas.job import JobEvent
@@ -31,6 +31,12 @@ class Poses(Schema):
     ridge: list[Row] | None = Field(description="Ridge that the poses belong to, as in the field; null: flat.")
     cameras: list[PosedCamera] = Field(description="Cameras with lenses and poses.")
     changed: list[Id] = Field(description="Cameras whose pose or lens differs from the previous revision.")
+    picture_motions: dict[Id, PictureMotion] = Field(
+        {},
+        exclude_if=is_empty,
+        description="By camera of `changed`, the motion of its picture since the previous revision, so that masks and "
+        "zones can follow; without cameras that are new. Only with `poses.changed`.",
+    )
 
 
 class PosesEvent(Attributed):

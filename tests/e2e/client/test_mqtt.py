@@ -178,6 +178,21 @@ def test_an_alarm_of_a_venue_is_seen_and_cleared_and_a_deleted_venue_is_taken_ba
     wait_for(lambda: watcher.text(config) == watcher.text(state) == "")
 
 
+def test_each_camera_has_a_topic_that_says_how_its_picture_moved(service, name, bridge, watcher):
+    put(service, name, "accept")
+    topics = {camera: f"{name}/{name}/cameras/{camera}/picture-motion" for camera in ("left", "right")}
+    wait_for(lambda: watcher.document(config_topic(name)))
+    assert [watcher.text(topic) for topic in topics.values()] == [None, None]
+    service.calibrated(name)
+    for camera, topic in topics.items():
+        moved = wait_for(lambda topic=topic: watcher.document(topic))
+        address = f"/venues/{name}/cameras/{camera}/picture-motion"
+        assert moved == service.http.get(address, params={"since": 1}).json()
+        assert (moved["since"], moved["revision"], len(moved["ground"])) == (1, 2, 3)
+    service.http.delete(f"/venues/{name}").raise_for_status()
+    wait_for(lambda: {watcher.text(topic) for topic in topics.values()} == {""})
+
+
 def test_the_button_calibrates_by_the_sources_of_a_venue(service, name, bridge, watcher, camera):
     cameras = [one | {"source": camera.url("/ok")} for one in venue(name)["cameras"]]
     put(service, name, "accept", cameras=cameras)
@@ -207,7 +222,8 @@ def test_venues_are_published_again_after_the_broker_has_forgotten_them(service,
 
 def test_what_was_deleted_meanwhile_is_taken_back_and_a_kept_command_is_not_obeyed(service, name, broker, watcher):
     put(service, name, "accept")
-    for topic, payload in ((f"{name}/gone/state", "{}"), (f"homeassistant/device/{name}_gone/config", "{}")):
+    motion, config = f"{name}/gone/cameras/left/picture-motion", f"homeassistant/device/{name}_gone/config"
+    for topic, payload in ((f"{name}/gone/state", "{}"), (motion, "{}"), (config, "{}")):
         watcher.publish(topic, payload, retain=True)
     watcher.publish(f"{name}/{name}/calibrate", "PRESS", retain=True)
     url, secret = f"mqtts://{USER}@localhost:{broker.tls_port}", broker.folder / "secret"
@@ -215,7 +231,7 @@ def test_what_was_deleted_meanwhile_is_taken_back_and_a_kept_command_is_not_obey
     files = {"ESC_MQTT_PASSWORD": "", "ESC_MQTT_PASSWORD_FILE": str(secret)}
     trust = {"SSL_CERT_FILE": str(broker.folder / "certificate.pem")}
     with mqtt(service, url, "--topic", name, **files, **trust) as process:
-        wait_for(lambda: watcher.text(f"homeassistant/device/{name}_gone/config") == "")
+        wait_for(lambda: watcher.text(config) == watcher.text(motion) == "")
         wait_for(lambda: watcher.document(config_topic(name)))
         assert watcher.text(f"{name}/gone/state") == ""
         process.send_signal(signal.SIGTERM)

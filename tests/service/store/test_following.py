@@ -8,6 +8,7 @@ import sqlalchemy as sa
 from service.schemas.events.webhooks import Webhook
 from service.schemas.job import JobError
 from service.store import tables
+from service.store.movement import picture_motion
 from testbed.homes import in_both_homes
 from testbed.stock import Stock
 
@@ -53,6 +54,15 @@ def test_new_poses_come_with_everything_that_draws_on_a_picture(stock):
     assert event.data.changed == ["right"]
     assert event.data.cameras == [camera.posed for camera in stock.venue("v").cameras]
     assert event.data.revision == stock.venues.health("v").revision
+
+
+def test_new_poses_come_with_how_the_pictures_of_changed_cameras_moved(stock):
+    stock.calibrated("v", accepted=["right"])
+    first, second = (one.event.data for one in stock.events.since("v", 0, ["poses.changed"], 100).events)
+    assert (first.revision, first.picture_motions) == (1, {})
+    before, after = ({camera.id: camera for camera in poses.cameras}["right"] for poses in (first, second))
+    assert second.picture_motions == {"right": picture_motion(stock.venue("v").field, (1, before), (2, after))}
+    assert stock.events.beginning("v", None).event.data.picture_motions == {}
 
 
 @in_both_homes
