@@ -24,6 +24,9 @@ WIDEST_OPENCV, WIDEST_FISHEYE = 20.0, math.tan(math.radians(89.0))
 """Undistorted radius (at depth 1) up to which the engine uses a lens of each model."""
 SPOKES, STEPS, FARTHER_STEPS = 64, 200, 100
 """Spokes, and rays along each: within twice the picture's radius (steps of 1 %), and farther out (steps of 4 %)."""
+NEAREST, FINE_STEPS = 1e-5, 4000
+"""Least undistorted radius and number of rays among which the end of a lens is sought: the whole picture of a long lens
+lies within some thousandths."""
 WIDEST_TURN, WIDEST_HEIGHT = math.radians(179.0), math.radians(89.0)
 """Largest angles about the axis of a panorama and from the plane across it at which the engine uses one."""
 GRID = 64
@@ -212,6 +215,25 @@ def _times_larger(across: float, down: float) -> float | None:
     return nearest if nearest != 1 and off[nearest] < CENTRED else None
 
 
+@lru_cache(maxsize=256)
+def largest_radius(model: LensModel, distortion: tuple[float, ...]) -> float:
+    """Return the undistorted radius (at depth 1) up to which the radial terms of a lens grow.
+
+    Beyond it the model folds back, and would put points from far outside the view into the picture.
+    """
+    widest = WIDEST_FISHEYE if model == "fisheye" else WIDEST_OPENCV
+    radii = np.concatenate([[0.0], np.geomspace(NEAREST, widest, FINE_STEPS)])
+    with np.errstate(all="ignore"):
+        growing = np.diff(_radial(model, distortion, radii)) > 0
+    # The end may lie before the first ray that does not grow, but not before the ray before that.
+    return widest if growing.all() else float(radii[max(int(np.argmin(growing)) - 1, 0)])
+
+
+def distorted(model: LensModel, distortion: Sequence[float], x: Array, y: Array) -> tuple[Array, Array]:
+    """Return the distorted coordinates (...) of rays (...) at depth 1 by OpenCV's formulae of a lens model."""
+    return (_through_fisheye if model == "fisheye" else _through_opencv)(distortion, x, y)
+
+
 def _radii(corner: float, widest: float) -> Array:
     """Return undistorted radii from 0 to `widest`, finely up to twice the `corner` of the picture."""
     if not 2 * corner < widest:
@@ -222,7 +244,7 @@ def _radii(corner: float, widest: float) -> Array:
 def _spokes(model: LensModel, distortion: Sequence[float], radii: Array) -> Array:
     """Return the distorted coordinates (2, radii, spokes) of rays along spokes, for an identity camera matrix."""
     x, y = DIRECTIONS[:, None] * radii[:, None]
-    return np.stack((_through_fisheye if model == "fisheye" else _through_opencv)(distortion, x, y))
+    return np.stack(distorted(model, distortion, x, y))
 
 
 def _through_fisheye(distortion: Sequence[float], x: Array, y: Array) -> tuple[Array, Array]:

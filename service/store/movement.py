@@ -1,8 +1,7 @@
 """Movement of a camera between two poses: degrees, metres, and pixels of the pitch in its picture.
 
 For history, alarms and what is said of a pose that was put, which the service writes itself: `quality.Moved` of the
-engine, on fewer points and a flat pitch. Lenses are OpenCV's own, which takes its time to load: import this where a
-movement is wanted.
+engine, on fewer points and a flat pitch. OpenCV takes its time to load: import this where a movement is wanted.
 """
 
 import math
@@ -16,14 +15,12 @@ from numpy.typing import NDArray
 from fields.shapes import Arc, Line, Shape, Spot
 from service.schemas.field import FieldOfPlay
 from service.schemas.geometry import Intrinsics, Moved, PictureMotion, PosedCamera
-from service.schemas.names import PANORAMAS, LensModel
+from service.schemas.lens_map import distorted, largest_radius
+from service.schemas.names import PANORAMAS
 
 Array = NDArray[np.float64]
 # The points on all markings together; rounding adds at most one for each marking.
 POINTS = 150
-# Samples (tangent of the angle from the axis) for finding where a lens model turns back: the whole picture of a long
-# lens lies within some thousandths.
-NEAREST, WIDEST, STEPS = 1e-4, 6.0, 600
 # Ground beside the field that counts to a picture's motion, points along each side of a grid, and how many of them fix
 # a homography (four) with some to spare.
 BESIDE_M, GRID, LEAST_SEEN = 10.0, 60, 8
@@ -151,14 +148,10 @@ def _seen(camera: PosedCamera, seen_from_camera: Array) -> Array:
     if camera.intrinsics.model in PANORAMAS:
         return _onto_panorama(camera.intrinsics, seen_from_camera)
     across, depth = np.hypot(*seen_from_camera.T[:2]), seen_from_camera[:, 2]
-    lens = camera.intrinsics
-    distortion = np.array(lens.distortion or [0.0] * 4)
-    held = (depth > 0) & (across <= _turning_back(lens.model, distortion) * depth)
-    places = np.full((len(seen_from_camera), 2), np.nan)
-    if held.any():
-        matrix = np.array(lens.matrix)
-        places[held] = _distorted(lens.model, distortion, seen_from_camera[held]) @ matrix[:2, :2].T + matrix[:2, 2]
-    return places
+    lens, matrix = camera.intrinsics, np.array(camera.intrinsics.matrix)
+    in_model = (depth > 0) & (across <= largest_radius(lens.model, tuple(lens.distortion)) * depth)
+    x, y = (seen_from_camera[:, :2] / np.where(in_model, depth, np.nan)[:, None]).T
+    return np.asarray(np.column_stack(distorted(lens.model, lens.distortion, x, y)) @ matrix[:2, :2].T + matrix[:2, 2])
 
 
 def _onto_panorama(lens: Intrinsics, seen_from_camera: Array) -> Array:
@@ -169,22 +162,3 @@ def _onto_panorama(lens: Intrinsics, seen_from_camera: Array) -> Array:
     height = slope if lens.model == "cylindrical" else np.arctan(slope)
     matrix = np.array(lens.matrix)
     return np.asarray(np.column_stack([np.arctan2(right, ahead), height]) @ matrix[:2, :2].T + matrix[:2, 2])
-
-
-def _turning_back(model: LensModel, distortion: Array) -> float:
-    """Return the tangent of the angle from the axis beyond which a lens model maps points back towards the middle."""
-    distances = np.concatenate([[0.0], np.geomspace(NEAREST, WIDEST, STEPS)])
-    rays = np.column_stack([distances, np.zeros_like(distances), np.ones_like(distances)])
-    radial = distortion.copy()
-    if model == "opencv":
-        radial[2:4] = radial[8:] = 0.0
-    with np.errstate(invalid="ignore"):
-        growing = np.diff(_distorted(model, radial, rays)[:, 0]) > 0
-    return math.inf if growing.all() else float(distances[np.argmin(growing)])
-
-
-def _distorted(model: LensModel, distortion: Array, rays: Array) -> Array:
-    """Project rays (N, 3) to image coordinates (N, 2) with a camera matrix of 1: OpenCV knows no skew."""
-    project = cv2.fisheye.projectPoints if model == "fisheye" else cv2.projectPoints
-    places, _ = project(rays[:, None], np.zeros(3), np.zeros(3), np.eye(3), distortion)
-    return np.asarray(places, dtype=float).reshape(-1, 2)

@@ -1,10 +1,13 @@
 """What the service says a camera moved, against the engine."""
 
+import math
 from typing import get_args
 
 import cv2
 import numpy as np
 import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
 
 from service.schemas.field import FieldOfPlay
 from service.schemas.geometry import Intrinsics, Pose, PosedCamera
@@ -80,6 +83,33 @@ def test_a_point_that_a_lens_formula_folds_back_into_the_picture_is_not_in_view(
     beside, before = movement.pixels(shot, np.array([[40.0, -49.0], [-20.0, 0.0]]))
     assert np.isnan(beside).all()
     assert np.isfinite(before).all()
+
+
+@given(
+    st.sampled_from(["opencv", "fisheye"]),
+    st.lists(st.floats(-0.4, 0.4), min_size=4, max_size=4),
+    st.floats(1e-3, 1),
+    st.floats(-math.pi, math.pi),
+)
+@example("fisheye", [0.02386051, -0.0100491, -0.00472673, -0.00176851], 1.0, 0.3)
+@example("opencv", [-0.004, 0.0, 0.0, 0.0], 1.0, 0.3)
+def test_no_lens_folds_what_lies_farther_aside_back_into_the_picture(model, terms, strength, bearing):
+    radial = [strength * term for term in terms]
+    lens = Intrinsics(
+        model=model,
+        matrix=[[900, 0, 960], [0, 900, 540], [0, 0, 1]],
+        distortion=radial if model == "fisheye" else [*radial[:2], 0, 0, radial[2]],
+    )
+    # Straight down from 10 m, from right below to far behind the horizon.
+    down = PosedCamera.model_construct(
+        id="left", image_size=[1920, 1080], intrinsics=lens, pose=Pose.from_position([math.pi, 0, 0], [0, 0, 10])
+    )
+    away = 10 * np.tan(np.radians(np.arange(0.05, 89.99, 0.05)))
+    places = movement.pixels(down, np.outer(away, [math.cos(bearing), math.sin(bearing)])) - [960, 540]
+    aside = (places * [math.cos(bearing), -math.sin(bearing)]).sum(axis=1)
+    seen = np.isfinite(aside)
+    assert (np.diff(aside[seen], prepend=0) > 0).all()
+    assert not seen[np.argmin(seen) :].any() or seen.all()
 
 
 @pytest.mark.parametrize("lens", ["none", "barrel"])

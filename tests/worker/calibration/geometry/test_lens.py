@@ -86,6 +86,24 @@ def test_beyond_its_end_a_model_has_no_derivatives(lens, beyond, turn):
         assert np.isnan(of(ray)).all()
 
 
+@given(st.sampled_from([Intrinsics, Fisheye]), up_to(0.5, 0.3, 0.1, 0.1), st.floats(0.01, 1), st.floats(-np.pi, np.pi))
+def test_no_model_folds_what_lies_farther_aside_back_into_the_picture(model, terms, strength, turn):
+    terms = strength * np.array(terms)
+    radial = terms if model is Fisheye else np.array([*terms[:2], 0, 0, terms[2]])
+    lens = model(np.array([[900.0, 0, 960], [0, 900, 540], [0, 0, 1]]), radial, SIZE)
+    # To all sides of the camera and behind it.
+    angles = np.radians(np.arange(0.05, 180, 0.05))
+    outwards = np.array([np.cos(turn), np.sin(turn)])
+    pixels = lens.project(10 * np.column_stack([np.outer(np.sin(angles), outwards), np.cos(angles)]))
+    aside = (pixels - [960, 540]) @ outwards
+    seen = np.isfinite(aside)
+    assert (np.diff(aside[seen], prepend=0) > 0).all()
+    assert not seen[np.argmin(seen) :].any()
+    # All but the ray at the very end, which rounding may put beyond it.
+    within = pixels[seen][:-1]
+    np.testing.assert_allclose(lens.distort(lens.undistort(within)), within, atol=2e-3)
+
+
 @pytest.mark.parametrize("shape", [(), (7,), (2, 3)])
 def test_rays_of_any_shape_have_the_derivatives_that_each_has_alone(shape):
     rays = np.random.default_rng(0).uniform(-0.3, 0.3, (*shape, 2))
