@@ -2,7 +2,7 @@
 
 Pixel centres are at 0.5 there and at integers here. Poses take the world to OpenCV's camera; unit and axes of the world
 are whatever the model was aligned to. Written are OPENCV where it is exact, else FULL_OPENCV, and OPENCV_FISHEYE; all
-models are read but those without a counterpart (FOV, THIN_PRISM_FISHEYE and newer ones).
+models are read but fisheyes with a thin prism and EQUIRECTANGULAR. DIVISION, FOV and EUCM become the nearest fisheye.
 """
 
 import struct
@@ -28,11 +28,17 @@ MODELS: dict[str, tuple[int, tuple[str, ...] | None]] = {
     "OPENCV": (4, ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2")),
     "OPENCV_FISHEYE": (5, ("fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4")),
     "FULL_OPENCV": (6, ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")),
-    "FOV": (7, None),
+    "FOV": (7, ("fx", "fy", "cx", "cy", "omega")),
     "SIMPLE_RADIAL_FISHEYE": (8, ("f", "cx", "cy", "k1")),
     "RADIAL_FISHEYE": (9, ("f", "cx", "cy", "k1", "k2")),
     "THIN_PRISM_FISHEYE": (10, None),
     "RAD_TAN_THIN_PRISM_FISHEYE": (11, None),
+    "SIMPLE_DIVISION": (12, ("f", "cx", "cy", "k")),
+    "DIVISION": (13, ("fx", "fy", "cx", "cy", "k")),
+    "SIMPLE_FISHEYE": (14, ("f", "cx", "cy")),
+    "FISHEYE": (15, ("fx", "fy", "cx", "cy")),
+    "EUCM": (16, ("fx", "fy", "cx", "cy", "alpha", "beta")),
+    "EQUIRECTANGULAR": (17, None),
 }
 COEFFICIENT_ORDER = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
 POINT2D_BYTES = 24
@@ -122,7 +128,7 @@ def _posed(
     return CameraRecord(stem_of(name), lens, size, pose)
 
 
-def _lens(node: Node, model: str, parameters: Sequence[float]) -> Intrinsics:
+def _lens(node: Node, model: str, parameters: Sequence[float], size: tuple[int, int]) -> Intrinsics:
     names = MODELS[model][1] if model in MODELS else None
     if names is None:
         known = ", ".join(name for name, (_, parts) in MODELS.items() if parts)
@@ -133,12 +139,30 @@ def _lens(node: Node, model: str, parameters: Sequence[float]) -> Intrinsics:
         )
     k = dict(zip(names, parameters, strict=True))
     fx, fy = k.get("fx", k.get("f", 0.0)), k.get("fy", k.get("f", 0.0))
-    matrix = camera_matrix(fx, fy, k["cx"] - 0.5, k["cy"] - 0.5)
+    principal = k["cx"] - 0.5, k["cy"] - 0.5
+    if model.endswith(("DIVISION", "FOV", "EUCM")):
+        return _fitted_lens(node, k, (fx, fy), principal, size)
+    matrix = camera_matrix(fx, fy, *principal)
     is_fisheye = model.endswith("FISHEYE")
     order = ("k1", "k2", "k3", "k4") if is_fisheye else COEFFICIENT_ORDER
     last = max((n for n, name in enumerate(order, start=1) if name in k), default=0)
     coefficients = [k.get(name, 0.0) for name in order[:last]]
     return lens_of(node, matrix, coefficients, "fisheye" if is_fisheye else "opencv")
+
+
+def _fitted_lens(
+    node: Node, k: dict[str, float], focal: tuple[float, float], principal: tuple[float, float], size: tuple[int, int]
+) -> Intrinsics:
+    # NumPy takes its time to load.
+    from service.formats.fitted_fisheye import division, enhanced_unified, field_of_view, fit_fisheye
+
+    if min(focal) <= 0:
+        node.refuse("focal lengths above 0 pixels")
+    if "k" in k:
+        angle_of = division(k["k"])
+    else:
+        angle_of = field_of_view(k["omega"]) if "omega" in k else enhanced_unified(k["alpha"], k["beta"])
+    return fit_fisheye(node, angle_of, focal, principal, size)
 
 
 def _is_cameras(file: ParsedFile) -> bool:
@@ -161,7 +185,8 @@ def _text_cameras(file: ParsedFile) -> Iterator[tuple[int, tuple[Intrinsics, tup
         if len(words) < 5:
             node.refuse("CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]")
         number, _, width, height, *parameters = (_number(node, word) for word in [words[0], "0", *words[2:]])
-        yield int(number), (_lens(node, words[1], parameters), (int(width), int(height)))
+        size = int(width), int(height)
+        yield int(number), (_lens(node, words[1], parameters, size), size)
 
 
 def _text_images(file: ParsedFile) -> Iterator[tuple[Node, list[float], int, str]]:
@@ -214,7 +239,7 @@ def _binary_cameras(file: ParsedFile) -> Iterator[tuple[int, tuple[Intrinsics, t
         name, parts = by_number.get(model, (f"number {model}", None))
         length = len(parts or ())
         parameters = _unpack(file, f"<{length}d", at + 24)
-        yield camera, (_lens(node, name, parameters), (width, height))
+        yield camera, (_lens(node, name, parameters, (width, height)), (width, height))
         at += 24 + 8 * length
     _require_end(file, at)
 

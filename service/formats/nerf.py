@@ -95,6 +95,8 @@ def _lens(top: Node, frame: Node) -> tuple[Intrinsics, tuple[int, int] | None]:
     width, height = member("w"), member("h")
     size = None if width is None or height is None else (width.integer(1), height.integer(1))
     angle = number("camera_angle_x")
+    if not 0 <= angle < math.pi:
+        raise FileRefusedError(frame.file, frame.place, "a camera_angle_x of less than half a turn", f"{angle:g}")
     if member("fl_x") is None and not (angle and size):
         raise FileRefusedError(frame.file, frame.place, "fl_x, or camera_angle_x with w and h", "neither")
     fx = number("fl_x") if size is None or not angle else number("fl_x", size[0] / 2 / math.tan(angle / 2))

@@ -306,7 +306,12 @@ MIRRORED = [[1.0, 0, 0], [0, 1.0, 0], [0, 0, -1.0]]
         ("a.xml", '<!DOCTYPE x [<!ENTITY a "b">]><opencv_storage/>', "expected valid XML, got a DOCTYPE"),
         ("a.xml", "<html></html>", "<html> in place of <opencv_storage>"),
         ("a.xml", "<a>" * 100 + "</a>" * 100, "more than 32 levels"),
-        ("cameras.txt", "1 FOV 1920 1080 900 900 960 540 0.1\n", "line 1: expected a model that OpenCV has too"),
+        ("cameras.txt", "1 THIN_PRISM_FISHEYE 1920 1080 9\n", "line 1: expected a model that OpenCV has too"),
+        ("cameras.txt", "1 DIVISION 1920 1080 500 500 960 540 -0.3\n", "less than 89 degrees .*, got 102 degrees"),
+        ("cameras.txt", "1 DIVISION 1920 1080 900 900 960 540 1\n", "farther aside .*, got one that folds"),
+        ("cameras.txt", "1 SIMPLE_DIVISION 1920 1080 1100 960 540 -0.8\n", "follows to 0.05 px, got one to 1."),
+        ("cameras.txt", "1 FOV 1920 1080 600 600 960 540 1.5\n", "less than 89 degrees .*, got 168 degrees"),
+        ("cameras.txt", "1 EUCM 1920 1080 300 300 960 540 0.6 1.1\n", "got one that folds"),
         ("cameras.txt", "# cameras\n1 OPENCV 1920 1080 900\n", "line 2: expected 8 parameters of OPENCV .*, got 1"),
         ("images.txt", "1 0 0 0 0 0 0 0 1 a.jpg\n\n", "line 1: expected a camera of cameras.txt"),
         (
@@ -332,6 +337,40 @@ def test_a_wrong_file_is_refused_with_its_place(name, content, words):
     with pytest.raises(FileRefusedError, match=words) as refused:
         read_files({name: content if isinstance(content, bytes) else content.encode()})
     assert str(refused.value).startswith(name)
+
+
+def test_a_fisheye_of_nerf_whose_view_is_no_pinholes_is_refused():
+    frame = {"transform_matrix": np.eye(4).tolist(), "camera_angle_x": 3.5, "w": 640, "h": 480, "is_fisheye": True}
+    with pytest.raises(FileRefusedError, match="a camera_angle_x of less than half a turn, got"):
+        read_files({"transforms.json": json.dumps({"frames": [frame]}).encode()})
+
+
+@pytest.mark.parametrize(
+    ("model", "parameters"),
+    [
+        ("SIMPLE_FISHEYE", [800, 950, 530]),
+        ("FISHEYE", [820, 810, 950, 530]),
+        ("SIMPLE_DIVISION", [1500, 950, 530, -0.25]),
+        ("DIVISION", [900, 910, 950, 530, -0.2]),
+        ("DIVISION", [1700, 1700, 950, 530, 0.1]),
+        ("FOV", [900, 910, 950, 530, 0.9]),
+        ("EUCM", [900, 910, 950, 530, 0.6, 1.1]),
+    ],
+)
+def test_lenses_of_colmap_that_opencv_lacks_become_fisheyes_that_show_the_same(missing, model, parameters):
+    try:
+        import pycolmap
+    except ImportError:
+        missing("colmap")
+    line = f"1 {model} 1920 1080 {' '.join(map(str, parameters))}\n"
+    ((camera,),) = [read_files({"cameras.txt": line.encode()}).cameras]
+    lens = camera.intrinsics
+    theirs = pycolmap.Camera(model=model, width=1920, height=1080, params=parameters)
+    pixels = np.stack(np.meshgrid(np.linspace(-0.5, 1919.5, 41), np.linspace(-0.5, 1079.5, 31)), -1).reshape(-1, 2)
+    rays = theirs.cam_from_img(pixels + 0.5)
+    again = LENSES[lens.model](np.array(lens.matrix), np.array(lens.distortion), camera.size).distort(rays)
+    assert lens.model == "fisheye"
+    assert np.linalg.norm(again - pixels, axis=1).max() < 0.05
 
 
 @given(st.binary(max_size=100) | st.text(max_size=100).map(str.encode))
