@@ -37,6 +37,11 @@ SECRETS = ("database_url", "webhook_secret")
 MODEL_BESIDE_THE_CODE = Path(__file__).resolve().parent.parent / "models" / "unet.onnx"
 
 
+def _program(module: str, description: str) -> Any:
+    """Return the setting of a program: by default a module that the Python of this process runs."""
+    return Field([sys.executable, "-P", "-m", module], description=description)
+
+
 class Settings(BaseSettings):
     """Settings of service and worker. A megabyte is 10^6 bytes; times are in seconds."""
 
@@ -150,35 +155,25 @@ class Settings(BaseSettings):
     source_timeout_s: float = Field(
         15, gt=0, le=120, description="Time limit for fetching the frames of a venue, all cameras in parallel."
     )
-    source_program: list[str] = Field(
-        [sys.executable, "-P", "-m", "worker.programs.snapshot"],
-        description="Program of API and worker that fetches frames.",
-    )
+    source_program: list[str] = _program("worker.programs.snapshot", "Program of API and worker that fetches frames.")
 
     # Poses in other formats.
     freed_axes: str = Field(
         "x y z pan tilt roll",
         description="Content of X, Y, height, pan, tilt, roll in FreeD packets, such as `y -x z -pan+90 tilt roll`.",
     )
-    map_program: list[str] = Field(
-        [sys.executable, "-P", "-m", "worker.programs.stmap"], description="Program of the API that computes ST maps."
+    map_program: list[str] = _program("worker.programs.stmap", "Program of the API that computes ST maps.")
+    pose_program: list[str] = _program(
+        "worker.programs.clicked_pose", "Program of the API that finds a first pose while points are clicked."
     )
-    pose_program: list[str] = Field(
-        [sys.executable, "-P", "-m", "worker.programs.clicked_pose"],
-        description="Program of the API that finds a first pose while points are clicked.",
-    )
-    plan_program: list[str] = Field(
-        [sys.executable, "-P", "-m", "worker.programs.plan"], description="Program of the API that plans cameras."
-    )
+    plan_program: list[str] = _program("worker.programs.plan", "Program of the API that plans cameras.")
 
     # Pictures and stitched views.
-    picture_program: list[str] = Field(
-        [sys.executable, "-P", "-m", "worker.programs.draw"],
-        description="Program of the API that draws pictures when they are first requested.",
+    picture_program: list[str] = _program(
+        "worker.programs.draw", "Program of the API that draws pictures when they are first requested."
     )
-    stitch_program: list[str] = Field(
-        [sys.executable, "-P", "-m", "worker.programs.stitch"],
-        description="Program of the API that makes packages and previews of stitched views.",
+    stitch_program: list[str] = _program(
+        "worker.programs.stitch", "Program of the API that makes packages and previews of stitched views."
     )
     pictures_at_once: int = Field(
         2,
@@ -208,9 +203,8 @@ class Settings(BaseSettings):
         "and the CPU quota of the container or unit. Results do not depend on it.",
     )
     job_timeout_s: float = Field(600, gt=0, description="Time limit of jobs without `timeout_s`.")
-    job_program: list[str] = Field(
-        [sys.executable, "-P", "-m", "worker.jobs.program"],
-        description="Program that computes one job, from standard input to standard output.",
+    job_program: list[str] = _program(
+        "worker.jobs.program", "Program that computes one job, from standard input to standard output."
     )
     takeover_after_s: float = Field(
         10, gt=2, description="Silence after which a worker counts as dead and another one takes its jobs over."

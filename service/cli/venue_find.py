@@ -19,6 +19,7 @@ from service.cli.arguments import (
     Wait,
     check_id,
     check_job_id,
+    parse_by_camera,
     parse_document,
     parse_frame_files,
 )
@@ -190,10 +191,9 @@ def _sought_site(
 
 def _parse_candidates(choices: Sequence[str]) -> dict[str, int | None]:
     """Return the number of the candidate of each camera, from arguments CAMERA=NUMBER; None: none of them."""
-    candidates: dict[str, int | None] = {}
-    for choice in choices:
-        camera, equals, number = choice.partition("=")
-        if not (camera and equals and number.isdecimal()):
-            fail(f"{choice!r} is not CAMERA=NUMBER, for instance right=2", USAGE)
-        candidates[camera] = int(number) or None
-    return candidates
+    form = "CAMERA=NUMBER, for instance right=2"
+    numbers = parse_by_camera(choices, form)
+    for camera, number in numbers.items():
+        if not number.isdecimal():
+            fail(f"'{camera}={number}' is not {form}", USAGE)
+    return {camera: int(number) or None for camera, number in numbers.items()}
