@@ -61,6 +61,13 @@ def assistant(service, *arguments):
 
 
 @pytest.fixture(scope="module")
+def storing(service_of_a_folder):
+    """An assistant whose operator allows it to store."""
+    with assistant(service_of_a_folder, "--allow-storing") as one:
+        yield one
+
+
+@pytest.fixture(scope="module")
 def camera():
     camera = NetworkCamera()
     yield camera
@@ -80,7 +87,9 @@ def positions(document):
     return {camera["id"]: camera["pose"]["position"] for camera in document["cameras"]}
 
 
-def test_an_assistant_reads_and_proposes_and_stores_nothing_unless_its_operator_allows_it(service, camera, name):
+def test_an_assistant_reads_and_proposes_and_stores_nothing_unless_its_operator_allows_it(
+    service, camera, name, storing
+):
     put(service, camera, name, "accept")
     with assistant(service) as one:
         assert one.server["serverInfo"]["name"] == "ESC"
@@ -108,18 +117,16 @@ def test_an_assistant_reads_and_proposes_and_stores_nothing_unless_its_operator_
         assert "should match pattern" in one.refused("get_venue", venue=f"../jobs/{job['id']}")
     assert revision(service, name) == 1
 
-    with assistant(service, "--allow-storing") as one:
-        assert one.call("store_proposal", job=job["id"])["venue_revision"] == 2
+    assert storing.call("store_proposal", job=job["id"])["venue_revision"] == 2
     assert revision(service, name) == 2
 
 
-def test_the_gate_stands_before_what_an_assistant_may_store(service, camera, name):
+def test_the_gate_stands_before_what_an_assistant_may_store(service, camera, name, storing):
     put(service, camera, name, "partly")
-    with assistant(service, "--allow-storing") as one:
-        job = one.call("propose_calibration", venue=name)
-        assert "The gate has rejected them" in one.refused("store_proposal", job=job["id"])
-        assert "The gate has accepted left." in one.refused("store_proposal", job=job["id"], camera="right")
-        assert revision(service, name) == 1
-        one.call("store_proposal", job=job["id"], camera="left")
+    job = storing.call("propose_calibration", venue=name)
+    assert "The gate has rejected them" in storing.refused("store_proposal", job=job["id"])
+    assert "The gate has accepted left." in storing.refused("store_proposal", job=job["id"], camera="right")
+    assert revision(service, name) == 1
+    storing.call("store_proposal", job=job["id"], camera="left")
     before, after = positions(venue(name)), positions(service.http.get(f"/venues/{name}").json())
     assert [camera for camera in after if after[camera] != before[camera]] == ["left"]
