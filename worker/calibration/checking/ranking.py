@@ -9,11 +9,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.checking.readings import Reading, readings
+from worker.calibration.checking.readings import Reading, poses_of, readings
 from worker.calibration.geometry.arrays import Array
 from worker.calibration.geometry.camera import Camera, Pose, inside
 from worker.calibration.geometry.field import Field
-from worker.calibration.geometry.plausible_pose import films_a_field
+from worker.calibration.geometry.plausible_pose import filming_mask, films_a_field
+from worker.calibration.geometry.rotation import rotation_matrices
 from worker.calibration.observe import FEWEST_VISIBLE_POINTS
 from worker.calibration.recovery import LEAST_PROPOSED
 from worker.calibration.relocalisation.agreement import agreement
@@ -39,10 +40,12 @@ def rank_readings(pitch: Field, cameras: Sequence[Camera], views: Sequence[LineV
     # On a symmetric field half a turn changes nothing: the file at its word would be tried once more.
     every = [one for one in readings() if not (field_map.is_symmetric and one.is_half_turn)]
     cost = COST_OF_A_CAUSE * np.array([len(reading.causes) for reading in every])
-    poses = [[reading.pose(camera.pose, half_sides) for reading in every] for camera in cameras]
+    meant = [poses_of(every, camera.pose, half_sides) for camera in cameras]
+    poses = [[Pose(*one) for one in zip(*its, strict=True)] for its in meant]
+    plausible = [filming_mask(rotation_matrices(rotations), positions) for rotations, positions in meant]
     filming = [
-        np.array([films_the_field(pitch, camera.with_pose(pose)) for pose in its])
-        for camera, its in zip(cameras, poses, strict=True)
+        np.array([maybe and _shows_lines(pitch, camera.with_pose(pose)) for maybe, pose in zip(*its, strict=True)])
+        for camera, *its in zip(cameras, plausible, poses, strict=True)
     ]
     coarse = np.mean(
         [_coarse(field_map, *one) for one in zip(views, poses, filming, strict=True)],
@@ -62,8 +65,10 @@ def rank_readings(pitch: Field, cameras: Sequence[Camera], views: Sequence[LineV
 
 def films_the_field(pitch: Field, camera: Camera) -> bool:
     """True if a camera films the field, and enough of its markings to be calibrated by."""
-    if not films_a_field(camera.pose):
-        return False
+    return films_a_field(camera.pose) and _shows_lines(pitch, camera)
+
+
+def _shows_lines(pitch: Field, camera: Camera) -> bool:
     lines = pitch.line_points()
     return int(inside(camera.project(lines.position), camera.intrinsics.size).sum()) >= FEWEST_VISIBLE_POINTS
 

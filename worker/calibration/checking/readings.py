@@ -54,11 +54,8 @@ class Reading:
 
     def pose(self, given: Pose, half_sides: Array) -> Pose:
         """Return the pose that the numbers of a given one mean; `half_sides` (2,) of the field, m."""
-        rotation, position = _turned(given, self.causes)
-        world_to_camera = self.camera_axes @ rotation @ self.axes.T
-        place = self.scale * (self.axes @ position)
-        place[:2] += np.array(self.corner) * half_sides
-        return Pose(rotation_vectors(world_to_camera), place)
+        (rotation,), (position,) = poses_of([self], given, half_sides)
+        return Pose(rotation, position)
 
     @property
     def is_half_turn(self) -> bool:
@@ -91,6 +88,17 @@ class Reading:
 def _axis(row: Array) -> str:
     number = int(np.argmax(np.abs(row)))
     return f"{'-' if row[number] < 0 else ''}{'xyz'[number]}"
+
+
+def poses_of(readings: Sequence[Reading], given: Pose, half_sides: Array) -> tuple[Array, Array]:
+    """Return the rotation vectors (P, 3) and positions (P, 3) that a given pose means by each reading."""
+    turned = {causes: _turned(given, causes) for causes in {one.causes for one in readings}}
+    rotations, positions = (np.stack(parts) for parts in zip(*(turned[one.causes] for one in readings), strict=True))
+    axes = np.stack([one.axes for one in readings])
+    matrices = np.stack([one.camera_axes for one in readings]) @ rotations @ axes.swapaxes(1, 2)
+    places = np.array([one.scale for one in readings])[:, None] * (axes @ positions[..., None])[..., 0]
+    places[:, :2] += np.array([one.corner for one in readings]) * half_sides
+    return rotation_vectors(matrices), places
 
 
 def _turned(given: Pose, causes: Sequence[Cause]) -> tuple[Array, Array]:

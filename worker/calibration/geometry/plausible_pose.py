@@ -2,6 +2,10 @@
 
 import math
 
+import numpy as np
+from numpy.typing import NDArray
+
+from worker.calibration.geometry.arrays import Array
 from worker.calibration.geometry.camera import Pose
 
 HIGHEST_M, FARTHEST_M = 200.0, 500.0
@@ -10,11 +14,14 @@ HIGHEST_M, FARTHEST_M = 200.0, 500.0
 
 def films_a_field(pose: Pose) -> bool:
     """True if a camera of this pose could film a field, whatever it sees there."""
-    x, y, z = pose.position
-    if not (0 < z <= HIGHEST_M and math.hypot(x, y) <= FARTHEST_M):
-        return False
-    right, down, forward = pose.matrix[:, 2]
+    return bool(filming_mask(pose.matrix, pose.position))
+
+
+def filming_mask(matrices: Array, positions: Array) -> NDArray[np.bool_]:
+    """True for each pose that could film a field: `matrices` (..., 3, 3), world to camera; `positions` (..., 3), m."""
+    x, y, z = np.moveaxis(positions, -1, 0)
+    stands = (z > 0) & (z <= HIGHEST_M) & (np.hypot(x, y) <= FARTHEST_M)
+    right, down, forward = np.moveaxis(matrices[..., 2], -1, 0)
+    upright = -down >= math.cos(math.radians(60.0)) * np.hypot(right, down)
     # Component of the view along the vertical from which a picture has no upright.
-    if abs(forward) > 0.95:
-        return bool(forward < 0)
-    return bool(-down >= math.cos(math.radians(60.0)) * math.hypot(right, down))
+    return np.asarray(stands & np.where(np.abs(forward) > 0.95, forward < 0, upright))
