@@ -62,9 +62,10 @@ def _of_rig(rig: Rig, asked: argparse.Namespace) -> dict[str, float]:
     ]
     scores = {one.name: Score() for one in compared}
     sheets: dict[str, list[Frame]] = {one.name: [] for one in compared}
+    rises = [part.rise[..., None] for part in made.parts]
     count = round(asked.seconds * RATE)
     for number in range(count):
-        shown = shown_by(made, clip.frames(number))
+        shown = shown_by(made, rises, clip.frames(number))
         here = truths(clip.game, view, made, number)
         for one in compared:
             weights = one.weights(shown)
@@ -116,14 +117,14 @@ def _seam_mask(made: Panorama) -> NDArray[np.bool_]:
 
 def _crossings(game: Game, view: StitchedView, made: Panorama, count: int) -> int:
     """Return how often feet, or the ball, pass from one camera's part to another's."""
-    total = 0
+    owner, total = made.owner, 0
     for index in range(len(game.runners) + 1):
         owners = []
         for number in range(count):
             spot = game.ball(number) if index == len(game.runners) else game.runners[index].at(number / RATE).foot
             column, row = np.rint(view.project(np.asarray(spot)[None])[0]).astype(int)
             if 0 <= column < view.size[0] and 0 <= row < view.size[1]:
-                owners.append(int(made.owner[row, column]))
+                owners.append(int(owner[row, column]))
         total += int(np.count_nonzero(np.diff(owners)))
     return total
 

@@ -178,10 +178,11 @@ def silhouettes(
     view: LevelView, thing: Person | Array, cameras: Sequence[Camera]
 ) -> tuple[tuple[slice, slice], list[NDArray[np.bool_]]]:
     """Return rows and columns of the view around a person or a ball, and where (h, w) each camera shows it."""
-    pixels = [
-        [view.project(_onto_ground(polygon, camera.pose.position)) for polygon in outlines(thing, camera.pose.position)]
-        for camera in cameras
-    ]
+    pixels = []
+    for centre in (camera.pose.position for camera in cameras):
+        polygons = outlines(thing, centre)
+        on_ground = view.project(_onto_ground(np.concatenate(polygons), centre))
+        pixels.append(np.split(on_ground, np.cumsum([len(one) for one in polygons[:-1]])))
     every = np.concatenate([polygon for one in pixels for polygon in one])
     if not np.isfinite(every).all():
         return (slice(0, 0), slice(0, 0)), []

@@ -53,12 +53,14 @@ def methods(made: Panorama, turf: NDArray[np.bool_]) -> list[Method]:
     ]
 
 
-def shown_by(made: Panorama, frames: Mapping[str, Frame]) -> list[NDArray[np.float32]]:
-    """Return what each camera shows (H, W, 3) of the whole view, evened out."""
+def shown_by(
+    made: Panorama, rises: Sequence[NDArray[np.float32]], frames: Mapping[str, Frame]
+) -> list[NDArray[np.float32]]:
+    """Return what each camera shows (H, W, 3) of the whole view, evened out; `rises` (H, W, 1): `Contribution.rise`."""
     found = []
-    for part in made.parts:
+    for part, rise in zip(made.parts, rises, strict=True):
         raw = cv2.remap(frames[part.camera], part.source, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-        found.append(np.asarray(cv2.LUT(raw, part.light.tones[:, None]), np.float32) * part.rise[..., None])
+        found.append(np.asarray(cv2.LUT(raw, part.light.tones[:, None]), np.float32) * rise)
     return found
 
 

@@ -37,6 +37,10 @@ class Canvas:
         """World points (N, 3) to pixels of the window (N, 2)."""
         return self.camera.project(points) - np.array(self.origin)
 
+    def project_each(self, polygons: list[Array]) -> list[Array]:
+        """World polygons (N, 3) to pixels of the window (N, 2), all in one go."""
+        return np.split(self.project(np.concatenate(polygons)), np.cumsum([len(one) for one in polygons[:-1]]))
+
     def near(self, starts: Array, ends: Array, reach: float) -> NDArray[np.bool_]:
         """Return which of N things between world points (N, 3) and (N, 3) may be seen within `reach` metres of them."""
         if len(starts) == 0:
@@ -211,8 +215,10 @@ class Person:
             return
         if (pixels.min(axis=0) > np.array([width, height]) + reach).any() or canvas.size_at(self.foot) == 0:
             return
-        for polygon, part in self.limbs():
-            canvas.polygon(canvas.project(self.place(canvas.camera.pose.position, polygon)), self.kit[part])
+        limbs = self.limbs()
+        placed = canvas.project_each([self.place(canvas.camera.pose.position, polygon) for polygon, _ in limbs])
+        for polygon, (_, part) in zip(placed, limbs, strict=True):
+            canvas.polygon(polygon, self.kit[part])
         if self.ball is not None:
             canvas.disc(self.ball, 0.11, np.float32([0.95, 0.95, 0.95]))
 
@@ -260,13 +266,14 @@ def draw_shadows(world: World, conditions: Conditions, canvas: Canvas, people: l
         reach = 12 * canvas.size_at(person.foot)
         if not np.isfinite(pixel).all() or (pixel < -reach).any() or (pixel > np.array([width, height]) + reach).any():
             continue
+        limbs = [polygon for polygon, _ in person.limbs()]
         for turn, up in lamps:
             away = -np.array([np.cos(turn), np.sin(turn)])
             side = np.array([-away[1], away[0]])
             layer = np.zeros_like(ink) if len(lamps) > 1 else ink
-            for polygon, _ in person.limbs():
-                ground = person.foot[:2] + polygon[:, :1] * side + polygon[:, 1:] / np.tan(up) * away
-                spots = canvas.project(np.column_stack([ground, np.full(len(ground), person.foot[2])]))
+            grounds = [person.foot[:2] + limb[:, :1] * side + limb[:, 1:] / np.tan(up) * away for limb in limbs]
+            lifted = [np.column_stack([ground, np.full(len(ground), person.foot[2])]) for ground in grounds]
+            for spots in canvas.project_each(lifted):
                 if np.isfinite(spots).all() and np.abs(spots).max() < 20000:
                     cv2.fillPoly(layer, [np.round(spots * 2**SHIFT).astype(np.int32)], 255, cv2.LINE_AA, SHIFT)
             if layer is not ink:
