@@ -79,7 +79,7 @@ class _Sampler:
         # Luma of the next level has the pixels of this one's chroma.
         planes = levels[self.level + 1][0], *levels[self.level][1:]
         sampled: list[Any] = [
-            cv2.remap(plane, *self.places, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE) for plane in planes
+            cv2.remap(plane, self.places, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE) for plane in planes
         ]
         colours = cv2.LUT(cv2.transform(cv2.merge(sampled), FROM_PLANES), self.tones)
         return np.asarray(cv2.multiply(colours.astype(np.float32), self.rise), np.float32)

@@ -2,9 +2,10 @@
 
 What is done in advance for a panorama, and done anew only when it changes: the view is cut into strips of rows, each
 strip into stretches of columns that show one camera alone or a seam, each at one level of detail (halved frames where
-the view is coarser than the frame); each stretch has its map in the fixed-point form that OpenCV samples fastest by,
-its share of the blend and what its lens takes from the corners. Light is put on in blue, green and red at the
-resolution of chroma; what that does to luma is looked up for grey, and the little that its colour adds is carried over.
+the view is coarser than the frame); each stretch has its map as floats, by which OpenCV 5 samples exactly and fastest,
+its share of the blend and what its lens takes from the corners. Where seams move, a stretch that is wholly of one
+camera for a while is made of that one alone. Light is put on in blue, green and red at the resolution of chroma; what
+that does to luma is looked up for grey, and the little that its colour adds is carried over.
 """
 
 from collections.abc import Mapping, Sequence
@@ -27,7 +28,7 @@ LARGEST_LEVEL = 5
 # Chroma of two rows lies between them, beside the left one of two columns.
 CHROMA_ROW = 0.5
 Planes = tuple[Plane, Plane, Plane]
-Map = tuple[NDArray[np.int16], NDArray[np.uint16]]
+Map = NDArray[np.float32]
 
 
 @dataclass(frozen=True)
@@ -123,19 +124,24 @@ class Renderer:
             here[0][:] = round(BLACK + BACKDROP * 219 / 255)
             here[1][:] = here[2][:] = NO_COLOUR
         for stretch, at in zip(strip.stretches, maps, strict=True):
+            if any(above.min() == 1 for above in stretch.above) or not (
+                stretch.share is None or stretch.share[0].any()
+            ):
+                continue
+            share = None if stretch.share is None or stretch.share[0].min() == 1 else stretch.share
             columns, half_columns = stretch.columns, _halved(stretch.columns)
             target = here[0][:, columns], here[1][:, half_columns], here[2][:, half_columns]
             view = self._views[stretch.camera]
             source = levels[stretch.camera][stretch.level]
-            if stretch.share is None and not view.lit:
+            if share is None and not view.lit:
                 _sample(source, at, target)
                 continue
             made: Sequence[Any] = [np.empty(plane.shape, np.uint8) for plane in target]
             _sample(source, at, made)
             if view.lit:
                 made = _corrected(view, stretch, made)
-            for plane, new, share in zip(target, made, stretch.share or 3 * (None,), strict=True):
-                plane[:] = new if share is None else cv2.blendLinear(new, plane, share, 1 - share)
+            for plane, new, opacity in zip(target, made, share or 3 * (None,), strict=True):
+                plane[:] = new if opacity is None else cv2.blendLinear(new, plane, opacity, 1 - opacity)
 
 
 @dataclass(frozen=True)
@@ -164,15 +170,16 @@ class _View:
 class _Stretch:
     """Columns of a strip that show one camera at one level of detail.
 
-    `share`: how much it counts before what is already there, of luma and of each chroma; None: alone. `rise`: what its
-    lens takes from the corners: of luma (h, w), of luma at the resolution of chroma (h/2, w/2) and of colours
-    (h/2, w/2, 3), in 255ths of `steepest`.
+    `share`: how much it counts before what is already there, of luma and of each chroma; None: alone. `above` (h, w):
+    opacities of luma of cameras that are drawn over it. `rise`: what its lens takes from the corners: of luma (h, w),
+    of luma at the resolution of chroma (h/2, w/2) and of colours (h/2, w/2, 3), in 255ths of `steepest`.
     """
 
     camera: int
     level: int
     columns: slice
     share: tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]] | None
+    above: Sequence[NDArray[np.float32]]
     rise: tuple[Plane, Plane, Plane] | None
     steepest: float
 
@@ -209,32 +216,38 @@ def _shares(weights: Sequence[NDArray[np.float32]]) -> list[Share]:
 
 def _strip(panorama: Panorama, shares: Sequence[Share], rows: slice) -> _Strip:
     stretches: list[_Stretch] = []
-    for number, (part, share) in enumerate(zip(panorama.parts, shares, strict=True)):
-        stretches += _stretches(number, part, rows, share)
+    for number, part in enumerate(panorama.parts):
+        stretches += _stretches(number, part, rows, shares[number:])
     unseen = ~np.any([share.luma[rows] > 0 for share in shares], axis=0)
     return _Strip(rows, bool(unseen.any()), stretches)
 
 
-def _stretches(number: int, part: Contribution, rows: slice, share_of_view: Share) -> list[_Stretch]:
-    """Return the stretches of a strip where a camera counts; blocks that are alike are merged."""
-    source, share = part.source[rows], share_of_view.luma[rows]
-    chroma = share_of_view.chroma[_halved(rows)]
+def _stretches(number: int, part: Contribution, rows: slice, shares: Sequence[Share]) -> list[_Stretch]:
+    """Return the stretches of a strip where a camera counts, by its share and those of cameras drawn over it.
+
+    Blocks where it is alone are merged; of others, each may be wholly of one camera for a while.
+    """
+    source, share = part.source[rows], shares[0].luma[rows]
+    chroma = shares[0].chroma[_halved(rows)]
     kinds = []
     for left in range(0, share.shape[1], BLOCK_COLUMNS):
         block = slice(left, min(left + BLOCK_COLUMNS, share.shape[1]))
         counts = share[:, block] > 0
-        if counts.any():
-            kinds.append((block, bool((share[:, block] == 1).all()), median_level(source[:, block], counts)))
-        else:
-            kinds.append((block, False, -1))
+        if not counts.any():
+            kinds.append((block, -1, left))
+            continue
+        alone = (share[:, block] == 1).all() and not any(above.luma[rows, block].any() for above in shares[1:])
+        kinds.append((block, median_level(source[:, block], counts), None if alone else left))
     found = []
-    for (alone, level), blocks in groupby(kinds, key=lambda kind: kind[1:]):
+    for (level, _), blocks in groupby(kinds, key=lambda kind: kind[1:]):
         if level >= 0:
             together = [block for block, *_ in blocks]
             columns = slice(together[0].start, together[-1].stop)
-            own = None if alone else (share[:, columns], *2 * (chroma[:, _halved(columns)],))
+            opaque = (share[:, columns] == 1).all()
+            own = None if opaque else (share[:, columns], *2 * (chroma[:, _halved(columns)],))
+            above = [one.luma[rows, columns] for one in shares[1:] if one.luma[rows, columns].any()]
             here = source[:, columns]
-            found.append(_Stretch(number, level, columns, own, *_rise(part, here, _between(here, own))))
+            found.append(_Stretch(number, level, columns, own, above, *_rise(part, here, _between(here, own))))
     return found
 
 
@@ -262,13 +275,9 @@ def _between(source: NDArray[np.float32], share: Sequence[NDArray[np.float32]] |
 
 
 def sampling_map(source: NDArray[np.float32], level: int) -> Map:
-    """Return the map to sample a plane that was halved `level` times at places (h, w, 2) of the whole one."""
-    at: Any = np.ascontiguousarray(source)
-    if level:
-        at = (at + np.float32(0.5)) / np.float32(1 << level) - np.float32(0.5)
-    nothing: Any = None
-    places, parts = cv2.convertMaps(at, nothing, cv2.CV_16SC2)
-    return np.asarray(places, np.int16), np.asarray(parts, np.uint16)
+    """Return the map (h, w, 2) to sample a plane that was halved `level` times at places (h, w, 2) of the whole one."""
+    at = (source + np.float32(0.5)) / np.float32(1 << level) - np.float32(0.5) if level else source
+    return np.ascontiguousarray(at)
 
 
 def _rise(
@@ -322,7 +331,7 @@ def _shrunk(plane: Plane) -> Plane:
 
 def _sample(source: Planes, maps: _Maps, target: Sequence[Plane]) -> None:
     for plane, at, onto in zip(source, (maps.luma, maps.chroma, maps.chroma), target, strict=True):
-        cv2.remap(plane, *at, cv2.INTER_LINEAR, onto, cv2.BORDER_REPLICATE)
+        cv2.remap(plane, at, None, cv2.INTER_LINEAR, onto, cv2.BORDER_REPLICATE)  # type: ignore[call-overload]
 
 
 def _corrected(view: _View, stretch: _Stretch, planes: Sequence[Any]) -> Sequence[Any]:
@@ -345,6 +354,6 @@ def _corrected(view: _View, stretch: _Stretch, planes: Sequence[Any]) -> Sequenc
 
 def _raised(values: Any, part: Plane, steepest: float, black: int) -> Any:
     """Return values with the vignetting of the lens removed from what is above `black`."""
-    above = cv2.addWeighted(values, 1, values, 0, -black) if black else values
+    above = cv2.subtract(values, black) if black else values
     change = cv2.multiply(above, part, scale=abs(steepest) / 255)
     return cv2.add(values, change) if steepest > 0 else cv2.subtract(values, change)

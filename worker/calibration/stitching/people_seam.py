@@ -283,7 +283,7 @@ def blend_shares(people: Values, second: Values, static: NDArray[np.float32]) ->
     """Return how much the second camera counts in a band's pixels (H, W), by `SeamBand.update`; else as `static`."""
     size = static.shape[1], static.shape[0]
     fine, labels = (cv2.resize(part, size, interpolation=cv2.INTER_LINEAR) for part in (people, second))
-    return np.asarray(cv2.blendLinear(labels, static, fine, 1 - fine), np.float32)
+    return np.asarray(static + np.asarray(fine) * (np.asarray(labels) - static), np.float32)
 
 
 def _square(side: int) -> Mask:
