@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.seam_people.game import FIELD, RATE, RIGS, Game, Rig, calibrated
-from benchmarks.seam_people.methods import Method, methods, shown_by
+from benchmarks.seam_people.methods import RARELY, Method, methods, shown_by
 from benchmarks.seam_people.scores import Lines, Score, truths
 from worker.calibration.geometry.camera import Array, Frame
 from worker.calibration.stitching.panorama import Panorama, panorama
@@ -60,17 +60,20 @@ def _of_rig(rig: Rig, asked: argparse.Namespace) -> dict[str, float]:
         for one in methods(made, shows_turf(FIELD, view))
         if not asked.methods or any(map(one.name.startswith, asked.methods))
     ]
-    scores = {one.name: Score() for one in compared}
+    scores = {one.name: Score(one.every / RATE) for one in compared}
     sheets: dict[str, list[Frame]] = {one.name: [] for one in compared}
     rises = [part.rise[..., None] for part in made.parts]
     count = round(asked.seconds * RATE)
+    sheet_moments = {RARELY * round((2 * number + 1) * count / (8 * RARELY)) for number in range(4)}
     for number in range(count):
         shown = shown_by(made, rises, clip.frames(number))
         here = truths(clip.game, view, made, number)
         for one in compared:
+            if number % one.every:
+                continue
             weights = one.weights(shown)
             scores[one.name].add(here, weights, shown, lines)
-            if asked.pictures is not None and number % (count // 4) == count // 8:
+            if asked.pictures is not None and number in sheet_moments:
                 sheets[one.name].append(_drawn(made, shown, weights))
     if asked.pictures is not None:
         _write_sheet(asked.pictures, rig.name, sheets)
@@ -133,17 +136,17 @@ def _print(
     rig: Rig, crossings: int, compared: list[Method], scores: dict[str, Score], lines: Lines
 ) -> dict[str, float]:
     print(f"{rig.name}: {rig.count} cameras, {crossings} crossings; px²·s per crossing")
-    print("                  wrong    cut  doubled vanished ghosted  jumps  seam moved  flicker  bent  steady  CPU ms")
+    print("                 pictures  wrong    cut  doubled vanished ghosted  jumps  seam moved  flicker  bent  steady  CPU ms")
     each = max(crossings, 1)
     wrong = {}
     for one in compared:
         score = scores[one.name]
-        seconds = len(score.offsets) / RATE
+        seconds = len(score.offsets) * score.step_s
         parts = [part / each for part in (score.wrong, score.cut, score.doubled, score.vanished, score.ghosted)]
         offsets = np.array(score.offsets)
         steady = float(np.sqrt(np.mean(np.var(offsets, axis=0).sum(axis=-1))))
         print(
-            f"  {one.name:14} {parts[0]:7.2f} {parts[1]:6.2f} {parts[2]:8.2f} {parts[3]:8.2f} {parts[4]:7.2f} "
+            f"  {one.name:14} {one.calls:8} {parts[0]:7.2f} {parts[1]:6.2f} {parts[2]:8.2f} {parts[3]:8.2f} {parts[4]:7.2f} "
             f"{score.handed_over / each:6.2f} {score.moved / seconds:9.0f} {score.flicker / seconds:9.0f} "
             f"{lines.bent(score.offsets):6.2f} {steady:6.3f} {1000 * one.took_s / one.calls:7.1f}",
             flush=True,

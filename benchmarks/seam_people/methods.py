@@ -17,16 +17,22 @@ from worker.calibration.stitching.panorama import Panorama
 from worker.calibration.stitching.people_seam import blend_shares, seam_bands
 
 Weights = Sequence[NDArray[np.float32]]
-# OpenCV's finders run on pictures half as large: its own sample stitches take a tenth of a megapixel.
+# OpenCV's finders run on pictures half as large, of a fifth of a megapixel: its own stitcher takes a tenth.
 SHRINK = 2
+# Of so many pictures the graph cut takes one: it needs core-seconds for each.
+RARELY = 10
 
 
 @dataclass
 class Method:
-    """A seam: `weigh` takes what each camera shows (H, W, 3); `took_s`: process seconds of all calls."""
+    """A seam: `weigh` takes what each camera shows (H, W, 3); `took_s`: process seconds of all calls.
+
+    `every`: of so many pictures it takes one.
+    """
 
     name: str
     weigh: Callable[[Sequence[NDArray[np.float32]]], Weights]
+    every: int = 1
     took_s: float = field(default=0.0, init=False)
     calls: int = field(default=0, init=False)
 
@@ -48,7 +54,7 @@ def methods(made: Panorama, turf: NDArray[np.bool_]) -> list[Method]:
         Method("static seam", lambda _: static),
         Method("feather", lambda _: feather),
         Method("DpSeamFinder", lambda shown: _opencv(cv2.detail.DpSeamFinder("COLOR_GRAD"), shown, seen)),
-        Method("GraphCut", lambda shown: _opencv(cv2.detail.GraphCutSeamFinder("COST_COLOR_GRAD"), shown, seen)),
+        Method("GraphCut", lambda shown: _opencv(cv2.detail.GraphCutSeamFinder("COST_COLOR_GRAD"), shown, seen), RARELY),
         Method("people", _People(made, turf)),
     ]
 

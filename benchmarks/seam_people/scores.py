@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.seam_people.game import FIELD, RATE, Game, silhouettes
+from benchmarks.seam_people.game import FIELD, Game, silhouettes
 from benchmarks.seam_people.methods import Weights
 from worker.calibration.geometry.camera import Array, Camera, inside
 from worker.calibration.stitching.panorama import Panorama
@@ -31,8 +31,12 @@ class Truth:
 
 @dataclass
 class Score:
-    """Sums over a clip: areas in px²·s, moved seam in px², and offsets of lines (moments, points) in px."""
+    """Sums over a clip: areas in px²·s, moved seam in px², and offsets of lines (moments, points) in px.
 
+    `step_s`: from one picture to the next.
+    """
+
+    step_s: float
     cut: float = 0.0
     doubled: float = 0.0
     vanished: float = 0.0
@@ -71,12 +75,12 @@ class Score:
         best = int(np.argmin([error.sum() for error in errors]))
         error, mask = errors[best], truth.by_camera[best]
         if total.sum() < VANISHED * max(whole):
-            self.vanished += max(whole) / RATE
+            self.vanished += max(whole) * self.step_s
             return
         ghost = (total > GHOST[0]) & (total < GHOST[1])
-        self.ghosted += float(error[ghost].sum()) / RATE
-        self.cut += float(error[~ghost & mask].sum()) / RATE
-        self.doubled += float(error[~ghost & ~mask].sum()) / RATE
+        self.ghosted += float(error[ghost].sum()) * self.step_s
+        self.cut += float(error[~ghost & mask].sum()) * self.step_s
+        self.doubled += float(error[~ghost & ~mask].sum()) * self.step_s
         self.handed_over += self._shown_by.get(number, best) != best
         self._shown_by[number] = best
 
