@@ -35,7 +35,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--only", nargs="*", default=[], help="names of rigs")
     parser.add_argument("--methods", nargs="*", default=[], help="beginnings of names of seams")
-    parser.add_argument("--seconds", type=float, default=4.0)
+    parser.add_argument("--seconds", type=float, default=2.0)
     parser.add_argument("--clips", type=Path, help="folder that keeps rendered frames for the next run")
     parser.add_argument("--pictures", type=Path, help="folder for contact sheets")
     asked = parser.parse_args()

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import cv2
 import numpy as np
@@ -10,7 +9,7 @@ from numpy.typing import NDArray
 
 from worker.calibration.stitching.panorama import Contribution, Panorama
 from worker.calibration.stitching.people_seam import SeamBand, Values, blend_shares, opened
-from worker.video.renderer import Map, Planes, Share, median_level, sampling_map
+from worker.video.renderer import Map, Planes, Share, median_level, sample_plane, sampling_map
 from worker.video.yuv_planes import FROM_PLANES
 
 
@@ -78,9 +77,7 @@ class _Sampler:
         """Return blue, green, red (h, w, 3) of a frame at each level of detail."""
         # Luma of the next level has the pixels of this one's chroma.
         planes = levels[self.level + 1][0], *levels[self.level][1:]
-        sampled: list[Any] = [
-            cv2.remap(plane, self.places, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE) for plane in planes
-        ]
+        sampled = [sample_plane(plane, self.places) for plane in planes]
         colours = cv2.LUT(cv2.transform(cv2.merge(sampled), FROM_PLANES), self.tones)
         return np.asarray(cv2.multiply(colours.astype(np.float32), self.rise), np.float32)
 

@@ -331,7 +331,13 @@ def _shrunk(plane: Plane) -> Plane:
 
 def _sample(source: Planes, maps: _Maps, target: Sequence[Plane]) -> None:
     for plane, at, onto in zip(source, (maps.luma, maps.chroma, maps.chroma), target, strict=True):
-        cv2.remap(plane, at, None, cv2.INTER_LINEAR, onto, cv2.BORDER_REPLICATE)  # type: ignore[call-overload]
+        sample_plane(plane, at, onto)
+
+
+def sample_plane(plane: Plane, places: Map, onto: Plane | None = None) -> Any:
+    """Return what a plane shows at places (h, w, 2) of it, made in `onto` (h, w) if there is one."""
+    no_second_map: Any = None
+    return cv2.remap(plane, places, no_second_map, cv2.INTER_LINEAR, onto, cv2.BORDER_REPLICATE)
 
 
 def _corrected(view: _View, stretch: _Stretch, planes: Sequence[Any]) -> Sequence[Any]:
