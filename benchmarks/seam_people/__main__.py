@@ -136,7 +136,9 @@ def _print(
     rig: Rig, crossings: int, compared: list[Method], scores: dict[str, Score], lines: Lines
 ) -> dict[str, float]:
     print(f"{rig.name}: {rig.count} cameras, {crossings} crossings; px²·s per crossing")
-    print("                 pictures  wrong    cut  doubled vanished ghosted  jumps  seam moved  flicker  bent  steady  CPU ms")
+    print(
+        "                 pictures  wrong    cut  doubled vanished ghosted  jumps    moved flicker  bent steady  CPU ms"
+    )
     each = max(crossings, 1)
     wrong = {}
     for one in compared:
@@ -146,9 +148,10 @@ def _print(
         offsets = np.array(score.offsets)
         steady = float(np.sqrt(np.mean(np.var(offsets, axis=0).sum(axis=-1))))
         print(
-            f"  {one.name:14} {one.calls:8} {parts[0]:7.2f} {parts[1]:6.2f} {parts[2]:8.2f} {parts[3]:8.2f} {parts[4]:7.2f} "
-            f"{score.handed_over / each:6.2f} {score.moved / seconds:9.0f} {score.flicker / seconds:9.0f} "
-            f"{lines.bent(score.offsets):6.2f} {steady:6.3f} {1000 * one.took_s / one.calls:7.1f}",
+            f"  {one.name:14} {one.calls:8} {parts[0]:7.2f} {parts[1]:6.2f} {parts[2]:8.2f} {parts[3]:8.2f} "
+            f"{parts[4]:7.2f} {score.handed_over / each:6.2f} {score.moved / seconds:8.0f} "
+            f"{score.flicker / seconds:7.0f} {lines.bent(score.offsets):5.2f} {steady:6.3f} "
+            f"{1000 * one.took_s / one.calls:7.1f}",
             flush=True,
         )
         wrong[one.name] = parts[0]

@@ -54,7 +54,9 @@ def methods(made: Panorama, turf: NDArray[np.bool_]) -> list[Method]:
         Method("static seam", lambda _: static),
         Method("feather", lambda _: feather),
         Method("DpSeamFinder", lambda shown: _opencv(cv2.detail.DpSeamFinder("COLOR_GRAD"), shown, seen)),
-        Method("GraphCut", lambda shown: _opencv(cv2.detail.GraphCutSeamFinder("COST_COLOR_GRAD"), shown, seen), RARELY),
+        Method(
+            "GraphCut", lambda shown: _opencv(cv2.detail.GraphCutSeamFinder("COST_COLOR_GRAD"), shown, seen), RARELY
+        ),
         Method("people", _People(made, turf)),
     ]
 

@@ -229,7 +229,7 @@ def _stretches(number: int, part: Contribution, rows: slice, shares: Sequence[Sh
     """
     source, share = part.source[rows], shares[0].luma[rows]
     chroma = shares[0].chroma[_halved(rows)]
-    kinds = []
+    kinds: list[tuple[slice, int, int | None]] = []
     for left in range(0, share.shape[1], BLOCK_COLUMNS):
         block = slice(left, min(left + BLOCK_COLUMNS, share.shape[1]))
         counts = share[:, block] > 0
@@ -358,7 +358,7 @@ def _corrected(view: _View, stretch: _Stretch, planes: Sequence[Any]) -> Sequenc
     return cv2.addWeighted(luma, 1, added, 1, -NO_COLOUR), blue, red
 
 
-def _raised(values: Any, part: Plane, steepest: float, black: int) -> Any:
+def _raised(values: Any, part: Plane, steepest: float, black: Any) -> Any:
     """Return values with the vignetting of the lens removed from what is above `black`."""
     above = cv2.subtract(values, black) if black else values
     change = cv2.multiply(above, part, scale=abs(steepest) / 255)
