@@ -2,14 +2,16 @@
 
     python -m benchmarks.fccb make SET --seed 1
     python -m benchmarks.fccb import SET left=left.jpg --name arena --sport basketball --calibration cameras.toml
+    python -m benchmarks.fccb import-dataset SET synloc data/SpiideoSynLoc --field 101.6x65.9
     python -m benchmarks.fccb answer SET ANSWERS --method esc
     python -m benchmarks.fccb answer SET ANSWERS --command "docker run --rm --network none -v {cases}:/cases:ro ..."
     python -m benchmarks.fccb score SET ANSWERS [ANSWERS ...]
     python -m benchmarks.fccb table SET --answers FOLDER
 
-`make` writes the same set for the same seed, `import` adds your own frames to one. `answer` runs a baseline, or any
-program: {cases} and {answers} in its command line become the two folders. `score` prints a table per folder of
-answers, `table` answers by all baselines first. What is answered already is not answered again.
+`make` writes the same set for the same seed, `import` adds your own frames to one, `import-dataset` those of a dataset.
+`answer` runs a baseline, or any program: {cases} and {answers} in its command line become the two folders. `score`
+prints a table per folder of answers, `table` answers by all baselines first. What is answered already is not answered
+again.
 """
 
 from __future__ import annotations
@@ -23,7 +25,8 @@ from pathlib import Path
 
 import cv2
 
-from benchmarks.fccb.importing import import_frames
+from benchmarks.fccb.datasets import DATASETS
+from benchmarks.fccb.importing import import_dataset, import_frames
 from benchmarks.fccb.making import make_set
 from benchmarks.fccb.methods import BASELINES, THREADS, answer_all
 from benchmarks.fccb.scoring import COLUMNS, overall, score
@@ -44,9 +47,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
         case "make":
             make_set(cases, asked.seed, {task: getattr(asked, task) for task in TASKS})
         case "import":
-            field = parse_field(asked.sport, asked.field).model_dump(exclude_none=True)
+            field = parse_field(asked.sport, asked.field)
             frames = {camera: files[0] for camera, files in parse_frame_files(asked.frames).items()}
             import_frames(cases, asked.name, field, asked.calibration, frames)
+        case "import-dataset":
+            dataset = DATASETS[asked.dataset]
+            if asked.field is None and not dataset.fixed_size:
+                raise SystemExit(
+                    f"--field: expected LENGTHxWIDTH in metres, as {asked.dataset} does not say it; got none"
+                )
+            field = parse_field(dataset.sport, asked.field)
+            number = import_dataset(cases, asked.dataset, field, asked.folder, asked.most)
+            print(f"{number} frames of {asked.dataset}, two cases each")
         case "answer" if asked.command:
             asked.answers.mkdir(parents=True, exist_ok=True)
             folders = {"cases": (asked.set / "cases").resolve(), "answers": asked.answers.resolve()}
@@ -81,6 +93,9 @@ def _parser() -> argparse.ArgumentParser:
     own.add_argument("--sport", required=True, help="template of the field")
     own.add_argument("--field", help="its size, as 105x68; the template's unless said")
     own.add_argument("--calibration", type=Path, nargs="+", required=True, help="files of any format ESC reads")
+    published = commands.add_parser("import-dataset", help="add frames of a published dataset to a set")
+    published.add_argument("--field", help="size of the fields in the folder, as 105x68; the template's unless said")
+    published.add_argument("--most", type=int, default=PUBLIC["keep"], help="frames, evenly out of all")
     answer = commands.add_parser("answer", help="answer the cases of a set")
     by = answer.add_mutually_exclusive_group(required=True)
     by.add_argument("--method", choices=BASELINES)
@@ -88,9 +103,11 @@ def _parser() -> argparse.ArgumentParser:
     scored = commands.add_parser("score", help="print the score of answers")
     table = commands.add_parser("table", help="answer by all baselines and print their scores")
     table.add_argument("--answers", type=Path, default=Path("runs/fccb/answers"))
-    for command in (make, own, answer, scored, table):
+    for command in (make, own, published, answer, scored, table):
         command.add_argument("set", type=Path, help="folder of the set")
     own.add_argument("frames", nargs="+", metavar="CAMERA=FRAME")
+    published.add_argument("dataset", choices=DATASETS)
+    published.add_argument("folder", type=Path, help="its folder, as it is unpacked")
     answer.add_argument("answers", type=Path, help="folder of the answers")
     scored.add_argument("answers", type=Path, nargs="+", help="folders of answers, one for each method")
     return parser

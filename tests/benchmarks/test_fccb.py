@@ -133,6 +133,88 @@ def test_frames_of_ones_own_become_cases_whose_truth_is_the_calibration(tmp_path
     assert cases.case("find-arena-a").site.cameras[0].pose is None
 
 
+# Points of the field that the cameras of the datasets below see, m.
+SEEN = np.array([[0.0, 0.0, 0.0], [5.0, 3.0, 0.0], [-6.0, 4.0, 0.0], [3.0, -5.0, 1.5]])
+
+
+def imported(tmp_path, dataset, *options):
+    """The camera that the truth of the only imported frame has."""
+    main(["import-dataset", str(tmp_path / "set"), dataset, str(tmp_path), *options])
+    cases = CaseSet(tmp_path / "set")
+    assert [cases.case(name).task for name in cases.names] == ["find", "keep"]
+    truth = cases.truth(cases.names[0])
+    return truth.moments[0][0].posed
+
+
+def picture(file, size=(960, 540)):
+    file.parent.mkdir(parents=True, exist_ok=True)
+    cv2.imwrite(str(file), np.zeros((size[1], size[0], 3), np.uint8))
+
+
+def test_frames_of_deepsport_are_read_in_centimetres_from_the_far_left_corner(tmp_path):
+    real = camera("a", (2, -14, 6), (0, 0), focal=700.0)
+    axes = np.diag([1.0, -1.0, -1.0])
+    rotation = real.pose.matrix @ axes
+    corner = 100 * (axes @ real.pose.position + (14.0, 7.5, 0.0))
+    calibration = {
+        "img_width": 960,
+        "img_height": 540,
+        "KK": real.intrinsics.matrix.ravel().tolist(),
+        "kc": real.intrinsics.distortion.tolist(),
+        "R": rotation.ravel().tolist(),
+        "T": (-rotation @ corner).tolist(),
+    }
+    picture(tmp_path / "ARENA" / "7" / "camcourt1_123_0.png")
+    (tmp_path / "ARENA" / "7" / "camcourt1_123.json").write_text(json.dumps({"calibration": calibration}))
+    found = imported(tmp_path, "deepsport")
+    np.testing.assert_allclose(found.project(SEEN), real.project(SEEN), atol=1e-6)
+
+
+def test_frames_of_synloc_are_read_with_the_pitch_along_y_and_a_lens_by_angle(tmp_path):
+    real = camera("a", (2, -50, 12), (0, 0))
+    across = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    rotation = real.pose.matrix @ across.T
+    # r = 0.8 θ - 0.05 θ³ of the width, and its inverse over the picture; the scale of a matrix means nothing.
+    angle = np.linspace(0, 1, 200)
+    image = {
+        "file_name": "000000.jpg",
+        "width": 960,
+        "height": 540,
+        "camera_matrix": (3 * np.column_stack([rotation, real.pose.translation])).tolist(),
+        "dist_poly": [-0.05, 0.0, 0.8, 0.0],
+        "undist_poly": np.polyfit(0.8 * angle - 0.05 * angle**3, angle, 8).tolist(),
+    }
+    picture(tmp_path / "val" / "000000.jpg")
+    (tmp_path / "annotations").mkdir()
+    (tmp_path / "annotations" / "val.json").write_text(json.dumps({"images": [image], "annotations": []}))
+    with pytest.raises(SystemExit, match="--field: expected LENGTHxWIDTH"):
+        imported(tmp_path, "synloc")
+    found = imported(tmp_path, "synloc", "--field", "101.6x65.9")
+    seen = SEEN @ across.T @ rotation.T + real.pose.translation
+    flat = seen[:, :2] / seen[:, 2:]
+    radius = np.linalg.norm(flat, axis=1)
+    off = np.arctan(radius)
+    expected = 960 * flat * ((0.8 * off - 0.05 * off**3) / radius)[:, None] + ((960 - 1) / 2, (540 - 1) / 2)
+    np.testing.assert_allclose(found.project(SEEN), expected, atol=1e-3)
+
+
+def test_a_camera_of_soccernet_is_read_at_the_size_of_its_frame(tmp_path):
+    real = camera("a", (0, -48, 10), (0, 0))
+    matrix = real.intrinsics.matrix.copy()
+    matrix[:2, 2] = 480, 270
+    real = replace(real, intrinsics=replace(real.intrinsics, matrix=matrix))
+    (tmp_path / "camera_00001.json").write_bytes(soccernet.write(NumberedCamera(camera_to_schema(real), 1)))
+    picture(tmp_path / "00001.jpg", (1920, 1080))
+    found = imported(tmp_path, "soccernet")
+    assert found.intrinsics.size == (1920, 1080)
+    np.testing.assert_allclose(found.project(SEEN), 2 * real.project(SEEN) + 0.5, atol=1e-6)
+
+
+def test_a_folder_without_what_a_dataset_has_is_refused_by_name(tmp_path):
+    with pytest.raises(SystemExit, match="expected pictures and cameras of deepsport, found none"):
+        imported(tmp_path, "deepsport")
+
+
 @pytest.mark.long
 def test_a_seed_makes_the_same_set_again_and_another_one_another(tmp_path):
     numbers = ["--keep", "1", "--find", "1", "--nights", "0", "--rigs", "0"]
