@@ -203,4 +203,5 @@ def write_case(cases: CaseSet, name: str, task: Task, made: Made) -> None:
         for names, of_moment in zip(files, made.moments, strict=True)
         for file, taken in zip(names.values(), of_moment, strict=True)
     }
-    cases.write(name, Case(task=task, site=site, moments=files), truth, frames)
+    lines = [np.round(marking.centre, 4).tolist() for marking in made.said.markings()]
+    cases.write(name, Case(task=task, site=site, moments=files, lines=lines), truth, frames)

@@ -41,6 +41,8 @@ class Case(BaseModel):
     task: Task
     site: SoughtSite
     moments: list[dict[str, str]]
+    lines: list[list[tuple[float, float]]] = []
+    """Middle of the paint of each line of the field, as the site has it: corners of a polyline, x and y, metres."""
 
     @property
     def pitch(self) -> Field:

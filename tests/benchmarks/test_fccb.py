@@ -33,7 +33,10 @@ def a_set(folder, real, *, stored=None, task="keep", shows_field=True):
     files = {one.id: f"{one.id}.jpg" for one in real}
     truth = [TrueCamera(camera=camera_to_schema(one), shows_field=shows_field) for one in real]
     frames = {file: np.zeros((8, 8, 3), np.uint8) for file in files.values()}
-    cases.write("one", Case(task=task, site=site, moments=[files]), Truth(field=field, moments=[truth]), frames)
+    lines = [marking.centre.tolist() for marking in PITCH.markings()]
+    cases.write(
+        "one", Case(task=task, site=site, moments=[files], lines=lines), Truth(field=field, moments=[truth]), frames
+    )
     return cases
 
 
@@ -130,6 +133,8 @@ def test_frames_of_ones_own_become_cases_whose_truth_is_the_calibration(tmp_path
     for name in cases.names:
         (exact / f"{name}.json").write_text((exact / "one.json").read_text())
     assert overall(score(cases, exact)) == 100
+    # Side lines are drawn outside the field: their outer edges bound it.
+    assert np.abs(np.concatenate(cases.case("find-arena-a").lines)).max() == pytest.approx(52.5, abs=0.1)
     assert cases.case("find-arena-a").site.cameras[0].pose is None
 
 

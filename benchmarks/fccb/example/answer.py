@@ -10,11 +10,11 @@ import sys
 from pathlib import Path
 
 
-def pose_of(field, camera, frame):
+def pose_of(field, lines, camera, frame):
     """Return the answer for one camera, or None to refuse.
 
-    `field`: template, length_m, width_m, line_width_m. `camera`: image_size, and where they are known, intrinsics and
-    the stored pose. `frame`: path of the JPEG.
+    `field`: template, length_m, width_m, line_width_m. `lines`: polylines [[x, y], ...] along the middle of the paint,
+    metres. `camera`: image_size, and where they are known, intrinsics and the stored pose. `frame`: path of the JPEG.
     """
     if "pose" not in camera:
         return None
@@ -28,7 +28,9 @@ def main(cases, answers):
         case = json.loads(file.read_text())
         site, moments = case["site"], []
         for frames in case["moments"]:
-            said = [pose_of(site["field"], one, file.parent / frames[one["id"]]) for one in site["cameras"]]
+            said = [
+                pose_of(site["field"], case["lines"], one, file.parent / frames[one["id"]]) for one in site["cameras"]
+            ]
             moments.append({"cameras": [one for one in said if one is not None]})
         (answers / f"{file.parent.name}.json").write_text(json.dumps({"moments": moments}))
 
