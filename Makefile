@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: setup demo test test-fast test-long generators charts coverage format check wheel release-dry-run docs bench bench-find bench-knocked bench-confidence bench-plan bench-check bench-fccb bench-real bench-cost bench-fields bench-segmentation bench-truth bench-service bench-faults bench-hostile bench-rate bench-versions bench-video bench-follow bench-live bench-seam-people bench-learned train lock clean
+.PHONY: setup demo test test-fast test-long generators charts coverage format check wheel release-dry-run docs bench bench-find bench-knocked bench-confidence bench-plan bench-check bench-fccb bench-real bench-cost bench-boards bench-fields bench-segmentation bench-truth bench-service bench-faults bench-hostile bench-rate bench-versions bench-video bench-follow bench-live bench-seam-people bench-learned train lock clean
 
 # What runs, without what tests, checks and clips need on top: a third of the size. Compiled where it is first imported.
 $(VENV)/.runtime: docker/requirements.lock requirements.lock pyproject.toml
@@ -161,6 +161,10 @@ bench-learned: $(VENV)/.bench
 ONLY ?= lenses gate nights twice
 bench-truth: $(VENV)/.bench $(VENV)/.train
 	for part in $(ONLY); do $(BENCH).$$part || exit 1; done
+
+# What a lens from a board is off by, and says, beside mrcal; needs the Debian packages mrcal and python3-mrcal.
+bench-boards: setup
+	$(BENCH).boards
 
 # BEFORE: a clone of an earlier release with its .venv; `git worktree add ../esc-before v0.1.0 && make -C ../esc-before setup`.
 bench-cost: setup

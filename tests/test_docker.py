@@ -1,5 +1,6 @@
 """What operators copy: the image, the compose files, the units; read, as not every machine can start them."""
 
+import json
 import re
 import shutil
 import subprocess
@@ -7,9 +8,13 @@ from pathlib import Path
 
 import pytest
 import yaml
+from typer.core import TyperGroup
+from typer.main import get_command
 
+from service.cli.main import app
 from service.serving import GRACE_S
-from service.settings import Settings
+from service.settings import Settings, unread_variables
+from service.variable_names import OF_CLIENTS
 
 ROOT = Path(__file__).parents[1]
 DOCKER = ROOT / "docker"
@@ -20,6 +25,8 @@ OURS = [
 ]
 UNITS = sorted((DOCKER / "systemd").glob("*.service"))
 MOST_EXPOSED = 20
+# Of a form that even callbacks take.
+A_SECRET = "whsec_dHdlbnR5LWZvdXIgYnl0ZXMgYW5kIHNv"
 PIN = re.compile(r"^([a-z0-9._-]+)==(\S+)", re.MULTILINE)
 
 
@@ -102,6 +109,54 @@ def test_the_large_compose_file_has_two_workers_of_names_of_their_own():
     api = services["api"]["environment"]
     assert all(its["environment"].items() >= api.items() for its in workers)
     assert {"ESC_DATABASE_URL", "ESC_BLOB_URL", "ESC_WEBHOOK_SECRET"} <= api.keys()
+
+
+def published_commands():
+    """What containers of the image are started with: by the files, by the image, and by hand as the files say."""
+    files = {name: (DOCKER / name).read_text() for name in (*COMPOSE, "compose.live.yaml")}
+    in_files = [
+        its["command"]
+        for text in files.values()
+        for its in yaml.safe_load(text)["services"].values()
+        if its["image"] == "esc" and "command" in its
+    ]
+    by_hand = [line.split() for text in files.values() for line in re.findall(r"run --rm (?:esc|api) (.*)", text)]
+    return [json.loads(re.search(r"^CMD (.*)", DOCKERFILE, re.MULTILINE)[1]), *in_files, *by_hand]
+
+
+@pytest.mark.parametrize("arguments", published_commands(), ids=" ".join)
+def test_commands_of_containers_are_commands_of_esc(arguments):
+    command, rest = get_command(app), arguments
+    while isinstance(command, TyperGroup):
+        _, command, rest = command.resolve_command(command.make_context("esc", [*rest]), [*rest])
+    command.make_context("esc", [*rest])
+
+
+@pytest.mark.parametrize(("file", "service"), OURS)
+def test_variables_of_containers_are_settings(file, service, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    of_image = dict(re.findall(r"\b(ESC_\w+)=(\S+)", DOCKERFILE))
+    for name, value in (of_image | COMPOSE[file]["services"][service]["environment"]).items():
+        monkeypatch.setenv(name, re.sub(r"\$\{.*?\}", A_SECRET, value))
+    assert unread_variables() == []
+    Settings()
+
+
+def test_variables_of_live_containers_are_of_clients():
+    (its,) = yaml.safe_load((DOCKER / "compose.live.yaml").read_text())["services"].values()
+    assert its["environment"].keys() <= OF_CLIENTS
+
+
+@pytest.mark.parametrize(("file", "service"), OURS)
+def test_ports_and_volumes_of_containers_are_those_of_the_image(file, service):
+    its = COMPOSE[file]["services"][service]
+    (exposed,) = re.findall(r"^EXPOSE (\d+)$", DOCKERFILE, re.MULTILINE)
+    (data,) = re.findall(r"^VOLUME (\S+)$", DOCKERFILE, re.MULTILINE)
+    assert {port.rpartition(":")[2] for port in its.get("ports", [])} <= {exposed}
+    assert (exposed, data) == (str(Settings.model_fields["port"].default), re.search(r"ESC_DATA=(\S+)", DOCKERFILE)[1])
+    named = [volume.split(":") for volume in its.get("volumes", [])]
+    assert all(name in COMPOSE[file]["volumes"] and inside == data for name, inside in named)
+    assert its.get("depends_on", {}).keys() <= COMPOSE[file]["services"].keys()
 
 
 @pytest.mark.parametrize(("file", "service"), OURS)

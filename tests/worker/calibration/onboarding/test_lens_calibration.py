@@ -1,14 +1,14 @@
 """Lenses from rendered photos of boards, whose camera is known."""
 
+from dataclasses import replace
 from functools import cache
 
-import cv2
 import numpy as np
 import pytest
 
+from testbed.boards import BoardCamera, board_places
 from testbed.parameters import try_first
 from worker.calibration.geometry.lens_models import LENSES
-from worker.calibration.geometry.rotation import rotation_matrices
 from worker.calibration.onboarding.boards import Board, BoardDetection, Charuco, find_board, other_size
 from worker.calibration.onboarding.lens_calibration import (
     LADDERS,
@@ -28,39 +28,25 @@ CHARUCO = Board(9, 6, 0.03, Charuco("4X4_50", 0.022))
 PINHOLE = LENSES["opencv"](
     np.array([[900.0, 0, 655], [0, 900, 470], [0, 0, 1]]), np.array([-0.28, 0.09, 0, 0, 0]), SIZE
 )
+CAMERA = BoardCamera(PINHOLE)
 FISHEYE = LENSES["fisheye"](
     np.array([[520.0, 0, 650], [0, 522, 484], [0, 0, 1]]), np.array([-0.03, 0.006, -0.002, 0.0]), SIZE
 )
-PAPER_PX_PER_M = 4000
-RIM_M = 0.03
-
-
-def places(count, reach=0.36, seed=1):
-    """How the board lies in each of some photos: rotation vector, and where its middle is (m, before the camera)."""
-    rng = np.random.default_rng(seed)
-    for number in range(count):
-        tilt = rng.uniform(-0.7, 0.7, 3) * [1, 1, 0.5]
-        depth = rng.uniform(0.35, 0.6)
-        # All over the picture, whatever the seed.
-        across = reach * np.array([np.cos(2.4 * number), 0.75 * np.sin(2.4 * number)]) * np.sqrt((number + 0.5) / count)
-        yield tilt, depth * np.array([*(1.6 * across), 1.0])
 
 
 def corners_seen(lens, tilt, middle, noise_px=0.0, rng=None, board=BOARD):
     """The detection of a board that lies so, without a picture; None where not all of it is in the picture."""
-    centred = board.corners - board.corners.mean(axis=0)
-    points = centred @ rotation_matrices(tilt).T + middle
-    pixel = lens.distort(points[:, :2] / points[:, 2:])
-    if not np.isfinite(pixel).all() or (pixel < 4).any() or (pixel > np.array(SIZE) - 5).any():
-        return None
-    return BoardDetection(board.corners, pixel + (rng.normal(0, noise_px, pixel.shape) if rng else 0.0), 3.0)
+    exact = BoardCamera(lens).corners(board, tilt, middle)
+    if exact is None or rng is None:
+        return exact
+    return replace(exact, pixel=exact.pixel + rng.normal(0, noise_px, exact.pixel.shape))
 
 
 @cache
 def detections(model="opencv", noise_px=0.2, count=16, reach=0.36):
     lens, rng = (FISHEYE if model == "fisheye" else PINHOLE), np.random.default_rng(5)
     spread = reach * (2.0 if model == "fisheye" else 1.0)
-    seen = [corners_seen(lens, *place, noise_px, rng) for place in places(count, spread)]
+    seen = [corners_seen(lens, *place, noise_px, rng) for place in board_places(count, spread)]
     return [s for s in seen if s is not None]
 
 
@@ -78,44 +64,10 @@ def from_the_left():
     return calibrate_lens([p for p in photos(count=24) if (p.detection.pixel[:, 0] < 750).all()], "opencv")
 
 
-def paper(board):
-    """The board as printed (H, W) with a white rim."""
-    squares = (board.columns + 1, board.rows + 1)
-    size = [round(count * board.square_m * PAPER_PX_PER_M) for count in squares]
-    if board.charuco:
-        picture = board.charuco_detector.getBoard().generateImage(size)
-    else:
-        y, x = np.indices((size[1], size[0])) // round(board.square_m * PAPER_PX_PER_M)
-        picture = np.where((x + y) % 2, 255, 0).astype(np.uint8)
-    rim = round(RIM_M * PAPER_PX_PER_M)
-    return cv2.copyMakeBorder(picture, rim, rim, rim, rim, cv2.BORDER_CONSTANT, value=255)
-
-
-@cache
-def rays():
-    """Of each pixel (H, W, 3), at depth 1; between those of every fourth one the lens bends them evenly."""
-    x, y = np.meshgrid(np.arange(1.5, SIZE[0], 4), np.arange(1.5, SIZE[1], 4))
-    slopes = cv2.resize(PINHOLE.undistort(np.stack([x, y], axis=-1)), SIZE)
-    return np.concatenate([slopes, np.ones((*SIZE[::-1], 1))], axis=-1)
-
-
-def photograph(board, tilt, middle, blur_px=0.7):
-    """A grey photo of a printed board: each pixel's ray cast to the paper."""
-    turn = rotation_matrices(tilt)
-    normal = turn[:, 2]
-    depth = (middle @ normal) / (rays() @ normal)
-    points = rays() * depth[..., None] - middle
-    # Inner corners begin a square after the edge of the squares.
-    on_paper = (points @ turn)[..., :2] + board.corners.mean(axis=0)[:2] + board.square_m + RIM_M
-    where = (on_paper * PAPER_PX_PER_M - 0.5).astype(np.float32)
-    photo = cv2.remap(paper(board), where, None, cv2.INTER_AREA, borderValue=110)
-    return cv2.GaussianBlur(photo, (0, 0), blur_px)
-
-
 @pytest.mark.parametrize("board", [BOARD, CHARUCO])
 def test_a_board_is_found_in_a_photo_to_a_tenth_of_a_pixel(board):
     tilt, middle = np.array([0.3, -0.35, 0.1]), np.array([0.03, -0.02, 0.45])
-    found = find_board(photograph(board, tilt, middle), board)
+    found = find_board(CAMERA.photograph(board, tilt, middle), board)
     truth = corners_seen(PINHOLE, tilt, middle, board=board)
     index = [int(np.argmin(np.linalg.norm(board.corners - corner, axis=1))) for corner in found.world]
     assert len(index) == 54
@@ -127,12 +79,12 @@ def test_a_board_is_found_in_a_photo_to_a_tenth_of_a_pixel(board):
 
 def test_part_of_a_charuco_board_is_enough():
     tilt, middle = np.array([0.2, 0.3, 0.0]), np.array([0.29, 0.0, 0.45])
-    found = find_board(photograph(CHARUCO, tilt, middle), CHARUCO)
+    found = find_board(CAMERA.photograph(CHARUCO, tilt, middle), CHARUCO)
     assert 8 <= len(found.world) < 54
 
 
 def test_a_photo_without_a_board_shows_none_and_squares_taken_for_corners_are_noticed():
-    photo = photograph(BOARD, np.array([0.2, 0.1, 0.0]), np.array([0.0, 0.0, 0.45]))
+    photo = CAMERA.photograph(BOARD, np.array([0.2, 0.1, 0.0]), np.array([0.0, 0.0, 0.45]))
     assert find_board(np.full_like(photo, 120), BOARD) is None
     assert find_board(photo, Board(10, 7, 0.03)) is None
     assert other_size(photo, Board(10, 7, 0.03)) == (9, 6)
@@ -141,7 +93,9 @@ def test_a_photo_without_a_board_shows_none_and_squares_taken_for_corners_are_no
 @pytest.mark.long
 def test_blur_is_measured():
     tilt, middle = np.array([0.2, 0.1, 0.0]), np.array([0.0, 0.0, 0.45])
-    sharp, soft = (find_board(photograph(BOARD, tilt, middle, blur_px=blur), BOARD).edge_px for blur in (0.7, 4.0))
+    sharp, soft = (
+        find_board(CAMERA.photograph(BOARD, tilt, middle, blur_px=blur), BOARD).edge_px for blur in (0.7, 4.0)
+    )
     assert soft > 2 * sharp
 
 
@@ -187,7 +141,7 @@ def test_a_principal_point_that_was_left_in_the_middle_is_known_as_well_as_photo
         np.array([[900.0, 0, 639.5], [0, 900, 479.5], [0, 0, 1]]), np.array([-0.2, 0, 0, 0]), SIZE
     )
     rng = np.random.default_rng(2)
-    seen = [corners_seen(middle, *place, 0.5, rng) for place in places(8)]
+    seen = [corners_seen(middle, *place, 0.5, rng) for place in board_places(8)]
     found = calibrate_lens([Photo(str(i), SIZE, s) for i, s in enumerate(seen) if s], "opencv")
     assert found.terms == ("f", "k1")
     assert 0.5 < found.lens.sigma["cx"] < 20
@@ -206,7 +160,7 @@ def test_how_well_the_ratio_of_both_focal_lengths_is_known_is_told_where_both_ar
 @pytest.mark.long
 def test_stretched_pixels_are_noticed():
     stretched = LENSES["opencv"](PINHOLE.matrix * [[1.0], [0.75], [1.0]], PINHOLE.distortion, SIZE)
-    seen = [corners_seen(stretched, *place, 0.2, np.random.default_rng(i)) for i, place in enumerate(places(12))]
+    seen = [corners_seen(stretched, *place, 0.2, np.random.default_rng(i)) for i, place in enumerate(board_places(12))]
     found = calibrate_lens([Photo(str(i), SIZE, s) for i, s in enumerate(seen) if s], "opencv")
     assert found.lens.matrix[1, 1] / found.lens.matrix[0, 0] == pytest.approx(0.75, abs=0.005)
 
