@@ -5,8 +5,9 @@
 
 The lens is known. *Rendered* boards are found as the service finds them; of the others, exact corners get noise. Both
 get the same corners. A lens is off by what is left once it is turned onto the true one (mrcal calls that the implied
-rotation): a turn is the pose's. mrcal says what it expects (`projection_uncertainty`, at infinity); ESC's lens has a
-deviation for each parameter, as the engine takes it: each is added, the lens turned back, and the squares summed.
+rotation): a turn is the pose's. Halves are lenses of every second photo. mrcal says what it expects
+(`projection_uncertainty`, at infinity); ESC's lens has a deviation for each parameter, as the engine takes it: each is
+added, the lens turned back, and the squares summed.
 """
 
 from __future__ import annotations
@@ -42,8 +43,10 @@ TRUTH = LENSES["opencv"](
     np.array([[900.0, 0, 655], [0, 900, 470], [0, 0, 1]]), np.array([-0.28, 0.12, 2e-4, -1e-4, -0.03]), SIZE
 )
 CAMERA = BoardCamera(TRUTH)
-# Parts of the way from the middle of the picture to its rim.
-PLACES = {"middle": 0.0, "halfway": 0.5, "rim": 0.97}
+CORNERS = np.array([(-1, -1), (-1, 1), (1, -1), (1, 1)], float)
+SIDES = np.array([(-1, 0), (1, 0), (0, -1), (0, 1)], float)
+# Directions from the middle of the picture, and how much of the way to its rim.
+PLACES = {"middle": 0.0 * SIDES, "halfway": 0.5 * CORNERS, "sides": 0.95 * SIDES, "corners": 0.95 * CORNERS}
 DEBIAN_PYTHON = "/usr/bin/python3"
 UNCERTAINTY = """
 import json, sys, mrcal, numpy
@@ -101,9 +104,9 @@ def by_mrcal(model: str, photos: Sequence[Photo]) -> Known:
         file = Path(folder) / "camera-0.cameramodel"
         (record,) = read_paths([file]).cameras
         sigma = {}
-        for place in PLACES:
+        for place, ways in PLACES.items():
             told = subprocess.run(
-                [DEBIAN_PYTHON, "-c", UNCERTAINTY, file, json.dumps(_pixels(place).tolist())],
+                [DEBIAN_PYTHON, "-c", UNCERTAINTY, file, json.dumps(_pixels(ways).tolist())],
                 check=True,
                 capture_output=True,
                 text=True,
@@ -144,14 +147,18 @@ def table(photos_of: Callable[[int], list[Photo]], sets: int) -> Iterator[str]:
 
 
 def apart_px(one: Lens, other: Lens) -> dict[str, float]:
-    """Return by place how far apart two lenses put rays once one is turned onto the other, px, rms along one axis."""
-    grid = np.stack(np.meshgrid(*(np.linspace(0, side - 1, 25) for side in SIZE)), axis=-1).reshape(-1, 2)
-    u, _, v = np.linalg.svd(_rays(other, grid).T @ _rays(one, grid))
+    """Return by place how far apart two lenses put rays, px, rms along one axis; NaN where a lens has no ray.
+
+    One is turned onto the other by the inner quarter of the picture, which all boards cover.
+    """
+    steps = np.linspace(-0.5, 0.5, 15)
+    inner = _pixels(np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2))
+    u, _, v = np.linalg.svd(_rays(other, inner).T @ _rays(one, inner))
     turn = u @ np.diag([1.0, 1.0, np.linalg.det(u @ v)]) @ v
     found = {}
-    for place in PLACES:
-        turned = _rays(one, _pixels(place)) @ turn.T
-        found[place] = rms(other.distort(turned[:, :2] / turned[:, 2:]) - _pixels(place))
+    for place, ways in PLACES.items():
+        turned = _rays(one, _pixels(ways)) @ turn.T
+        found[place] = rms(other.distort(turned[:, :2] / turned[:, 2:]) - _pixels(ways))
     return found
 
 
@@ -162,10 +169,9 @@ def _rays(lens: Lens, pixels: Array) -> Array:
     return rays / np.linalg.norm(rays, axis=1, keepdims=True)
 
 
-def _pixels(place: str) -> Array:
-    """Return the pixels (8, 2) of a place: towards the corners of the picture and the middles of its sides."""
-    ways = np.array([(x, y) for x in (-1, 0, 1) for y in (-1, 0, 1) if x or y], float)
-    return (np.array(SIZE) - 1) / 2 * (1 + PLACES[place] * ways)
+def _pixels(ways: Array) -> Array:
+    """Return the pixels (N, 2) that are so much (N, 2) of the way from the middle of the picture to its rim."""
+    return (np.array(SIZE) - 1) / 2 * (1 + ways)
 
 
 def _shifted(lens: Lens, name: str, by: float) -> Lens:

@@ -108,6 +108,5 @@ def test_the_commands_of_the_large_compose_file_calibrate_within_512_mb_each(env
         # Ends with 0 only if the result was accepted.
         subprocess.run([*ESC, "calibrate", "demo", *frames, "--wait"], env=client, check=True, timeout=4 * DEADLINE_S)
     assert subprocess.run(health, env=of_check, capture_output=True).returncode == 1
-    print(f"peak memory: API {peak_of_api[0]:.0f} MB, worker {worker[1][0]:.0f} MB")
     assert 0 < peak_of_api[0] < MOST_MB
     assert 0 < worker[1][0] < MOST_MB
