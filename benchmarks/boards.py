@@ -190,6 +190,11 @@ def _shifted(lens: Lens, name: str, by: float) -> Lens:
 
 def all_over(seed: int) -> list[Photo]:
     """Return photos of boards all over the picture, by their corners."""
+    return [photo for photo, _ in _seen(seed, 4 * PHOTOS // 3)]
+
+
+def middle(seed: int) -> list[Photo]:
+    """Return photos of boards about the middle of the picture."""
     return [photo for photo, _ in islice(_seen(seed), PHOTOS)]
 
 
@@ -201,20 +206,28 @@ def left_half(seed: int) -> list[Photo]:
 def rendered(seed: int) -> list[Photo]:
     """Return rendered photos of boards all over the picture, and what was found in them."""
     rng, photos = np.random.default_rng([8, seed]), []
-    for exact, place in islice(_seen(seed), PHOTOS):
+    for exact, place in _seen(seed, 4 * PHOTOS // 3):
         clean = CAMERA.photograph(BOARD, *place)
         noisy = np.clip(clean + rng.normal(0, NOISE_GREY, clean.shape), 0, 255).astype(np.uint8)
         photos.append(replace(exact, detection=find_board(noisy, BOARD)))
     return [photo for photo in photos if photo.detection is not None]
 
 
-SETS: Mapping[str, Callable[[int], list[Photo]]] = {"all-over": all_over, "left-half": left_half, "rendered": rendered}
+SETS: Mapping[str, Callable[[int], list[Photo]]] = {
+    "all-over": all_over,
+    "middle": middle,
+    "left-half": left_half,
+    "rendered": rendered,
+}
 
 
-def _seen(seed: int) -> Iterator[tuple[Photo, tuple[Array, Array]]]:
-    """Yield boards that are whole in the picture, by noisy corners, and how each lies."""
+def _seen(seed: int, count: int = 40 * PHOTOS) -> Iterator[tuple[Photo, tuple[Array, Array]]]:
+    """Yield those of `count` boards that are whole in the picture, by noisy corners, and how each lies.
+
+    They lie from the middle outwards.
+    """
     rng = np.random.default_rng([7, seed])
-    for number, place in enumerate(board_places(40 * PHOTOS, seed=seed)):
+    for number, place in enumerate(board_places(count, seed=seed)):
         exact = CAMERA.corners(BOARD, *place)
         if exact is not None:
             noisy = replace(exact, pixel=exact.pixel + rng.normal(0, NOISE_PX, exact.pixel.shape))
