@@ -5,7 +5,7 @@ from datetime import datetime
 from types import MappingProxyType
 from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import Field, computed_field
 
 from service.schemas.base import OPEN_WORD, Id, OpenChoice, Schema
 from service.schemas.check import CheckResult
@@ -107,6 +107,12 @@ class Refined(Schema):
         "if no marking is in view."
     )
 
+    @computed_field(description="The same as `longer`.")  # type: ignore[prop-decorator]
+    @property
+    def focal_length_change(self) -> float:
+        """Relative difference of the focal length."""
+        return self.longer
+
 
 class LensChange(Schema):
     """Change of a camera's focal length since the first nights of its memory."""
@@ -118,6 +124,18 @@ class LensChange(Schema):
         description="The change in words; null while it is within three sigma.",
         examples=["focal length 0.6 ± 0.1 % longer than on 3 November: zoom ring or focus"],
     )
+
+    @computed_field(description="The same as `longer`.")  # type: ignore[prop-decorator]
+    @property
+    def focal_length_change(self) -> float:
+        """Relative difference of the focal length."""
+        return self.longer
+
+    @computed_field(description="The same as `words`.")  # type: ignore[prop-decorator]
+    @property
+    def summary(self) -> str | None:
+        """The change in a sentence."""
+        return self.words
 
 
 class Proposal(Schema):
@@ -335,6 +353,15 @@ class PhotoResult(Schema):
     rms_px: float | None = Field(description="Root mean square error of its corners, pixels.")
     left_out_px: float | None = Field(description="The same with a lens fitted to the other photos.")
     blurred: bool = Field(description="True if it is less sharp than the others.")
+
+    @computed_field(  # type: ignore[prop-decorator]
+        description="The same as `fate`, with `excluded` in place of `hurts`.",
+        json_schema_extra={"x-extensible-enum": ["used", "no-board", "wrong-size", "excluded"]},
+    )
+    @property
+    def outcome(self) -> str:
+        """Use of the photo."""
+        return "excluded" if self.fate == "hurts" else self.fate
 
 
 class CoverageResult(Schema):

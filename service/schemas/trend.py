@@ -7,7 +7,7 @@ result accepted by hand, or a restored revision.
 from datetime import datetime
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, computed_field
 
 from service.schemas.base import OPEN_WORD, Id, Schema
 from service.schemas.geometry import PosedCamera
@@ -140,3 +140,9 @@ class Trend(Schema):
     moved_m: float = Field(description="Moving average at the far touchline relative to the baseline, m.")
     baseline_nights: int = Field(description="Number of nights that make the baseline, at most 20.")
     points: list[TrendPoint] = Field(description="Nights, oldest first.")
+
+    @computed_field(description="The same as `words`.")  # type: ignore[prop-decorator]
+    @property
+    def summary(self) -> str:
+        """The state in a sentence."""
+        return self.words
