@@ -142,8 +142,8 @@ UNREADABLE = "Entries of this page that are stored but cannot be read; absent if
 
 
 def is_empty(value: object) -> bool:
-    """True for a list that an answer leaves out: one without entries."""
-    return value == []
+    """True for a list or an object that an answer leaves out: one without entries."""
+    return value in ([], {})
 
 
 def is_none(value: object) -> bool:

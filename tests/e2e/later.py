@@ -9,7 +9,17 @@ import httpx
 
 SAYS_MORE = {"added_later": {"list": [1, None, {}]}}
 # Not of fields, but of names that somebody gave, or of stages, lens numbers and measures.
-OF_NAMES = ("measures_m", "sigma", "timings_s", "cpu_s", "links", "frames", "options", "field_numbers")
+OF_NAMES = (
+    "measures_m",
+    "sigma",
+    "timings_s",
+    "cpu_s",
+    "links",
+    "frames",
+    "options",
+    "field_numbers",
+    "picture_motions",
+)
 
 
 class LaterService(ThreadingHTTPServer):
