@@ -18,7 +18,8 @@ from testbed.running import png
 from tests.e2e.commands import esc_here
 from tests.service.cli.test_check import records
 from tests.worker.calibration.onboarding.test_first_pose import CAMERA, LENS, SIZE, clicks
-from tests.worker.calibration.onboarding.test_lens_calibration import BOARD, CAMERA
+from tests.worker.calibration.onboarding.test_lens_calibration import BOARD
+from tests.worker.calibration.onboarding.test_lens_calibration import CAMERA as BOARD_CAMERA
 
 WAIT = {"wait": 60}
 
@@ -30,8 +31,8 @@ def service(service_with_engine):
 
 def photos(count):
     """So many photos of a board and one of none, encoded."""
-    seen = [place for place in board_places(20) if CAMERA.corners(BOARD, *place)]
-    files = {f"board {number}.jpg": CAMERA.photograph(BOARD, *place) for number, place in enumerate(seen[:count])}
+    seen = [place for place in board_places(20) if BOARD_CAMERA.corners(BOARD, *place)]
+    files = {f"board {number}.jpg": BOARD_CAMERA.photograph(BOARD, *place) for number, place in enumerate(seen[:count])}
     files["empty.png"] = np.full((960, 1280), 90, np.uint8)
     return {name: cv2.imencode(name[-4:], photo)[1].tobytes() for name, photo in files.items()}
 
