@@ -200,21 +200,21 @@ class _Checker:
 
         A crown that nobody told, or a length that is another, looks like cameras that have moved.
         """
-        settled = [one for one in self.settled.values() if one.found is not None]
-        if all(one.stands for one in settled):
+        settled = self.settled.values()
+        standing = sum(one.stands for one in settled)
+        if standing == len(settled):
             return
         found = [one.found.camera for one in settled if one.found is not None]
         fitted = fit_field(self.pitch, found, {one.id: self.frames[one.id] for one in found}, self.segment, self.seed)
         if fitted.rejected_because is not None or not any(measure.known for measure in fitted.measures):
             return
-        results = self._calibrated([one.meant for one in settled], "never", fitted.pitch)
-        there = [
-            replace(one, pitch=fitted.pitch, found=result)
-            for one, result in zip(settled, results, strict=True)
+        there = {
+            result.camera.id: replace(self.settled[result.camera.id], pitch=fitted.pitch, found=result)
+            for result in self._calibrated([one.meant for one in settled], "never", fitted.pitch)
             if result.accepted
-        ]
-        if sum(one.stands for one in there) > sum(one.stands for one in settled):
-            self.settled |= {one.given.id: one for one in there}
+        }
+        if sum(one.stands for one in there.values()) > standing:
+            self.settled |= there
 
     def calibrate_turned(self) -> None:
         """Calibrate the open cameras where they stand, whatever way they look."""

@@ -10,7 +10,6 @@ from worker.calibration.checking.readings import Cause
 from worker.calibration.gate.displacement import measure_displacement
 from worker.calibration.gate.quality import CameraResult, Moved
 from worker.calibration.geometry.camera import Array, Camera, Pose
-from worker.calibration.geometry.field import Field
 from worker.calibration.robust import SURE
 
 Grade = Literal["good", "drifted", "wrong", "cannot-tell"]
@@ -48,13 +47,13 @@ def grade(checked: CheckedCamera, lens_folds: str | None) -> GradedCamera:
     A lens that folds where no marking is, in a corner of the sky, does no harm.
     """
     folds: list[tuple[CauseOfGrade, str]] = [] if lens_folds is None else [("folds", lens_folds)]
-    pitch, found = checked.pitch, checked.found
+    found = checked.found
     if found is None:
         return _not_found(checked, folds)
     if not checked.has_pose:
         said: list[tuple[CauseOfGrade, str]] = [("no-pose", "the file has a lens and no pose; one was found")]
         return GradedCamera(checked, "cannot-tell", [*folds, *said], None)
-    difference = _difference(pitch, checked.meant, found)
+    difference = _difference(checked, found)
     tolerance = max(good_within_px(checked.meant), SURE * (difference.sigma_pixels or 0.0))
     written: list[tuple[CauseOfGrade, str]] = [*zip(checked.reading.causes, checked.reading.words, strict=True)]
     if checked.is_resized:
@@ -64,7 +63,7 @@ def grade(checked: CheckedCamera, lens_folds: str | None) -> GradedCamera:
     since: list[tuple[CauseOfGrade, str]] = []
     if difference.pixels > tolerance:
         written += folds
-        since += _changes(pitch, checked, found, tolerance)
+        since += _changes(checked, found, tolerance)
     if written or any(cause in ("other-place", "other-lens") for cause, _ in since):
         return GradedCamera(checked, "wrong", [*written, *since], difference)
     return GradedCamera(checked, "drifted" if since else "good", since, difference)
@@ -77,25 +76,23 @@ def _not_found(checked: CheckedCamera, folds: list[tuple[CauseOfGrade, str]]) ->
     return GradedCamera(checked, "wrong", [*folds, ("unexplained", why)], None)
 
 
-def _difference(pitch: Field, meant: Camera, found: CameraResult) -> Difference:
-    ground = measure_displacement(pitch, meant, found)
+def _difference(checked: CheckedCamera, found: CameraResult) -> Difference:
+    ground = measure_displacement(checked.pitch, checked.meant, found)
     sigma = None if found.ground_sigma is None else float(np.sqrt(np.mean(found.ground_sigma.pixels**2)))
     return Difference(
-        Moved.between(pitch, meant, found.camera).pixels,
+        checked.moved_px,
         sigma,
         None if ground is None else float(np.hypot(*ground.shift)),
         None if ground is None else float(np.hypot(*ground.sigma)),
     )
 
 
-def _changes(
-    pitch: Field, checked: CheckedCamera, found: CameraResult, tolerance_px: float
-) -> list[tuple[CauseOfGrade, str]]:
+def _changes(checked: CheckedCamera, found: CameraResult, tolerance_px: float) -> list[tuple[CauseOfGrade, str]]:
     """Return what happened to a camera since, or what else is wrong: each that alone moves the markings in view.
 
     Where none does so alone, the one that moves them most.
     """
-    meant, now = checked.meant, found.camera
+    pitch, meant, now = checked.pitch, checked.meant, found.camera
     moved = Moved.between(pitch, meant, now)
     if checked.searched == "anywhere" and moved.exceeds_limits:
         x, y, z = now.pose.position
