@@ -318,14 +318,17 @@ def _by_name(values: Array, rung: Rung, lens: Lens) -> dict[str, float]:
 
 
 def _known_to(chosen: _Chosen) -> dict[str, float]:
-    """Return one standard deviation per parameter as a lens names it: the worse of two, both focal lengths apart.
+    """Return one standard deviation per number of the lens: the worse of two, both focal lengths apart.
 
-    A principal point that was left in the middle is known as well as by the simplest lens that has it free.
+    A term that was left out is known as well as by the simplest lens that has it free: photos that do not need it say
+    nothing of the places that they do not reach.
     """
+    lens = chosen.best.fit.lens
     known = _worse(*chosen.best.deviations)
-    if "cx" not in known:
-        free = next((_worse(*one.deviations) for one in chosen.tried if "cx" in one.rung.terms), {})
-        known |= {name: free[name] for name in ("cx", "cy") if name in free}
+    open_terms = [name for name in PARAMETERS[lens.model][2 : 4 + len(lens.distortion)] if name not in known]
+    for tried in chosen.tried:
+        richer = _worse(*tried.deviations)
+        known = {name: richer[name] for name in open_terms if name in richer} | known
     if "f" in known:
         one = known.pop("f")
         return {"fx": one, "fy": one, **known}
