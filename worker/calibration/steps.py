@@ -23,7 +23,14 @@ from worker.calibration.geometry.visibility import VisibleLines
 from worker.calibration.problem import PoseSolution, Problem
 from worker.calibration.records import ProgressReporter
 from worker.calibration.refinement.diagnosis import is_sure
-from worker.calibration.refinement.refine import SEARCH_PX, LineReader, Observations, evaluate_poses, refine
+from worker.calibration.refinement.refine import (
+    CLEARLY_MORE,
+    SEARCH_PX,
+    LineReader,
+    Observations,
+    evaluate_poses,
+    refine,
+)
 from worker.calibration.refinement.uncertainty import Deviation, RefinedPose, RefinedPoses
 from worker.calibration.search.genome import genome_of
 from worker.calibration.search.objective import Objective
@@ -33,9 +40,8 @@ CAPTURE_RAD = 0.1
 """Largest angle between a line and its place by the stored pose: 4 degrees of rotation and 0.3 m at 15 m."""
 LEAST_CAUGHT = 0.6
 """Share of the expected lines that has to be caught in the frame for lines alone to suffice."""
-MOST_CAUGHT, CLEARLY_MORE, MOST_AGAIN = 0.9, 0.02, 3
-"""Agreement with the lines below which a refinement is begun again from where it ended, by how much it has to grow with
-that, and how often it may."""
+MOST_CAUGHT, MOST_AGAIN = 0.9, 3
+"""Agreement with the lines below which a refinement is begun again from where it ended, and how often it may."""
 HARDLY_MOVED_PX = 12.0
 """Largest mean motion of the visible lines, in pixels of a 4K frame, of a camera that stands almost where it is stored:
 within what the refinement catches."""
@@ -89,13 +95,13 @@ def single_camera_problem(problem: Problem, number: int) -> Problem:
     return replace(problem.of([number]), options=replace(problem.options, fit_ridge=ridge))
 
 
-def best_attempt(problem: Problem, found: Camera, progress: ProgressReporter) -> Attempt:
-    """Refine a single camera from where the joint search `found` it, and while it fails the gate from other poses."""
-    best = _attempt(problem, found, progress)
+def best_attempt(problem: Problem, first: Attempt, progress: ProgressReporter) -> Attempt:
+    """Return the `first` attempt at a single camera; while that fails the gate, the best of those from other poses."""
+    best = first
     for start in _other_starts(problem, progress, lost=not best.result.is_explained):
         if best.result.accepted:
             break
-        best = max(best, _attempt(problem, start, progress), key=lambda attempt: attempt.agreement)
+        best = max(best, attempt(problem, start, progress), key=lambda one: one.agreement)
     return best
 
 
@@ -106,7 +112,8 @@ def _other_starts(problem: Problem, progress: ProgressReporter, *, lost: bool) -
     yield problem.cameras[0]
 
 
-def _attempt(problem: Problem, begun: Camera, progress: ProgressReporter) -> Attempt:
+def attempt(problem: Problem, begun: Camera, progress: ProgressReporter) -> Attempt:
+    """Refine a single camera from where a search found it (`begun`), and judge it."""
     refined = refine_poses(problem, [begun], problem.observed.observations, progress)
     return Attempt(begun, refined, judge_each(problem, refined, progress)[0])
 
@@ -186,8 +193,8 @@ def refine_poses(
 ) -> RefinedPoses:
     """Refine the cameras jointly onto the lines of these `observations`, from where they were found (`begun`).
 
-    Where one of them ends without some of its lines, again from there while more are found: lines beside which the
-    search for them has narrowed are found from where the others led.
+    Where one of them ends with most of its lines and not all, again from there while more are found: lines beside which
+    the search for them has narrowed are found from where the others led.
     """
     with progress.timed("refinement"):
         progress.at("refinement", 0.0)
@@ -197,7 +204,7 @@ def refine_poses(
         if free:
             return refined
         for _ in range(MOST_AGAIN):
-            if _weakest_agreement(refined) >= MOST_CAUGHT:
+            if not 0.5 < _weakest_agreement(refined) < MOST_CAUGHT:
                 break
             again = _refined_from(problem, refined.cameras, observations, free)
             if _weakest_agreement(again) < _weakest_agreement(refined) + CLEARLY_MORE:

@@ -13,7 +13,7 @@ from worker.calibration.geometry.camera import Camera, Frame
 from worker.calibration.problem import ObservedCameras, Problem
 from worker.calibration.records import NOT_RECORDED, ProgressReporter
 from worker.calibration.robust import SURE
-from worker.calibration.steps import best_attempt, ridge_responses, search_poses, single_camera_problem
+from worker.calibration.steps import attempt, best_attempt, ridge_responses, search_poses, single_camera_problem
 
 MOST_OF_ITS_OWN, LEAST_OF_ANOTHER = 0.3, 0.6
 """Share of the expected places at which a line is seen: a frame of which its own camera has more is not asked about,
@@ -74,7 +74,8 @@ def _result_as(
     alone = replace(alone, observed=frame, memories=[None], recorder=NOT_RECORDED)
     # The network has looked where the lines of the one camera can be, which is not where those of the other are.
     searched = search_poses(alone, ridge_responses(alone), progress.muted())
-    return best_attempt(alone, searched.cameras[0], progress.muted()).result
+    first = attempt(alone, searched.cameras[0], progress.muted())
+    return best_attempt(alone, first, progress.muted()).result
 
 
 def _stands_nearer(result: CameraResult, own: Camera, other: Camera) -> bool:

@@ -18,7 +18,9 @@ from worker.calibration.refinement.refine import Observations
 from worker.calibration.refinement.uncertainty import RefinedPoses
 from worker.calibration.search.search import Found
 from worker.calibration.steps import (
+    Attempt,
     assess_stored,
+    attempt,
     best_attempt,
     follows_zoom,
     is_confirmed,
@@ -82,7 +84,10 @@ def search_and_refine(
         for n in failing:
             tried_before = n in alone
             if not tried_before:
-                alone[n] = best_attempt(single_camera_problem(problem, n), begun[n], progress)
+                by_itself = single_camera_problem(problem, n)
+                is_alone = together == [n] and by_itself.options == problem.options
+                first = Attempt(begun[n], refined, results[n]) if is_alone else attempt(by_itself, begun[n], progress)
+                alone[n] = best_attempt(by_itself, first, progress)
                 begun[n] = alone[n].begun
             if tried_before or not alone[n].result.accepted:
                 together = [other for other in together if other != n]

@@ -31,6 +31,8 @@ from worker.calibration.robust import huber_weights, tukey_weights
 SEARCH_PX = (14.0, 8.0, 5.0)
 """Half width of the search for lines round by round, in pixels of a 4K frame."""
 EVALUATION_SEARCH_PX = 8.0
+CLEARLY_MORE = 0.02
+"""Growth of the agreement with the lines that counts."""
 MOST_STEPS = 4
 """Most steps of a coarse round."""
 NOT_LOOKED_AT: NDArray[np.float32] = np.zeros((1, 1), dtype=np.float32)
@@ -175,13 +177,23 @@ class _Refiner:
             estimate = this.towards_tukey(estimate, measured).to
         return estimate
 
+    def agreement(self, estimate: Estimate) -> float:
+        """Return the agreement 0..1 of the frames with the lines where the cameras put them: the best camera's."""
+        return max(one.agreement for one in self.evidence(estimate))
+
+    def evidence(self, estimate: Estimate) -> list[Evidence]:
+        """Return the evidence for the lines of the field where the cameras put them."""
+        lines = estimate.on_ground(self.unknowns)
+        return self.reader.evidence(estimate.pitch, lines[~lines.end_to_end], estimate.cameras)
+
     def settle(self, estimate: Estimate) -> GaussNewtonStep:
         """Return the step that leads to where the cameras stand still.
 
         What is read of a frame depends a little on where its pixels lie beside the lines. So the frames are read anew
         at the poses that the last reading led to, until that moves nothing: the end does not depend on the beginning.
+        Poses that miss more lines than they find are no answer, and are left where a reading leads to no more lines.
         """
-        moves = list[float]()
+        moves, agreement = list[float](), self.agreement(estimate)
         self.reader.read_anew()
         for _ in range(6):
             last = replace(self.around(estimate), found=estimate.cameras).follow(estimate)
@@ -192,6 +204,10 @@ class _Refiner:
             # fifth of it: they have arrived where the next one would move them less than 0.1 mm.
             if moves[-1] * max(nearer, 0.2) < 1e-4:
                 break
+            if agreement <= 0.5:
+                before, agreement = agreement, self.agreement(estimate)
+                if agreement < before + CLEARLY_MORE:
+                    break
             self.reader.read_anew()
         return last
 
@@ -307,7 +323,7 @@ def _assessed(
 ) -> RefinedPoses:
     refiner = refiner.around(estimate)
     lines, reader = estimate.on_ground(refiner.unknowns), refiner.reader
-    evidence = reader.evidence(estimate.pitch, lines[~lines.end_to_end], estimate.cameras)
+    evidence = refiner.evidence(estimate)
     everything = _of_seen(estimate.pitch, reader.measure(lines, estimate.cameras, EVALUATION_SEARCH_PX), evidence)
     measured = with_misfit_noise(estimate, refiner.without_repainted(everything))
     # A field that is wrong looks like a ground that swells a lot: judged, it has to be an ordinary ground.

@@ -27,7 +27,7 @@ from worker.calibration.gate.quality import GATE
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.parameters import free_focal_lengths, free_ridge, lens_parameters
 from worker.calibration.geometry.rotation import rotation_angles_deg
-from worker.calibration.refinement.refine import Observations, evaluate_poses, refine
+from worker.calibration.refinement.refine import LineReader, Observations, evaluate_poses, refine
 from worker.calibration.robust import huber_weights, tukey_weights
 
 pytestmark = pytest.mark.slow
@@ -143,6 +143,23 @@ def test_where_it_ends_does_not_depend_on_where_it_began():
 
 
 @pytest.mark.long
+class _CountingReader(LineReader):
+    """A reader of lines that counts how often frames are read once more."""
+
+    times = 0
+
+    def read_anew(self):
+        self.times += 1
+        super().read_anew()
+
+
+def test_frames_are_not_read_again_and_again_for_a_pose_that_misses_most_lines():
+    reader = _CountingReader(pair_observed().of([0]))
+    (lost,) = refine(CROWNED, [moved(LEFT, (0.1, 0.05, 0.0))], pair_observed().of([0]), 0.5, reader=reader).each
+    assert lost.evidence.agreement < 0.5
+    assert reader.times == 1
+
+
 def test_the_error_is_of_the_size_of_its_sigma():
     cameras = pair()
     responses = pair_markings()
