@@ -61,9 +61,9 @@ LENS_KNOWN, FOCAL_SOUGHT, LENS_SOUGHT = LensSteps(0.0, 0.0), LensSteps(0.08, 0.0
 
 def rotations_of(pan: Array, tilt: Array, roll: Array) -> Array:
     """Return rotations (..., 3, 3), world to camera: `pan` from x towards y, `tilt` below the horizon, rad."""
-    zero = np.zeros_like(pan)
-    forward = np.stack([np.cos(tilt) * np.cos(pan), np.cos(tilt) * np.sin(pan), -np.sin(tilt)], axis=-1)
-    right = np.stack([np.sin(pan), -np.cos(pan), zero], axis=-1)
-    down = np.cross(forward, right)
+    (cos_pan, sin_pan), (cos_tilt, sin_tilt) = ((np.cos(angle), np.sin(angle)) for angle in (pan, tilt))
+    forward = np.stack([cos_tilt * cos_pan, cos_tilt * sin_pan, -sin_tilt], axis=-1)
+    right = np.stack([sin_pan, -cos_pan, np.zeros_like(pan)], axis=-1)
+    down = np.stack([-sin_tilt * cos_pan, -sin_tilt * sin_pan, -cos_tilt], axis=-1)
     cosine, sine = np.cos(roll)[..., None], np.sin(roll)[..., None]
     return np.stack([cosine * right + sine * down, cosine * down - sine * right, forward], axis=-2)

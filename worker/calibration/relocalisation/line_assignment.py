@@ -31,7 +31,7 @@ def positions(field: FieldMap, view: LineView, direction: Direction, most: int) 
 
 def _positions(field: FieldMap, view: LineView, rotation: Array, focal: float) -> Array:
     """Return positions (n, 3), the best matched first."""
-    normal = view.normals(focal) @ rotation
+    normal = view.normals(np.array(focal)) @ rotation
     # Largest angle, rad, between the plane of a segment and a direction along which it runs.
     most_rad = 0.012
     along_x = (np.abs(normal[:, 0]) < most_rad) & (np.abs(normal[:, 0]) < np.abs(normal[:, 1]))
@@ -39,15 +39,11 @@ def _positions(field: FieldMap, view: LineView, rotation: Array, focal: float) -
     lengths = view.lengths
     on_y = _lines(normal[along_x, 2] / normal[along_x, 1], lengths[along_x])
     on_x = _lines(normal[along_y, 2] / normal[along_y, 0], lengths[along_y])
-    found = [
-        ((x, y, height), score)
-        for height, y, x, score in _matched(on_y, field.lines_along_x, on_x, field.lines_along_y, field.half_size[0])
-    ] + [
-        ((x, y, height), score)
-        for height, x, y, score in _matched(on_x, field.lines_along_y, on_y, field.lines_along_x, field.half_size[1])
-    ]
-    found.sort(key=lambda one: -one[1])
-    return np.array([place for place, _ in found]).reshape(-1, 3)
+    by_y = _matched(on_y, field.lines_along_x, on_x, field.lines_along_y, field.half_size[0])
+    by_x = _matched(on_x, field.lines_along_y, on_y, field.lines_along_x, field.half_size[1])
+    places = np.concatenate([by_y[:, [2, 1, 0]], by_x[:, [1, 2, 0]]])
+    scores = np.concatenate([by_y[:, 3], by_x[:, 3]])
+    return places[np.argsort(-scores, kind="stable")]
 
 
 def _lines(measures: Array, lengths: Array) -> tuple[Array, Array]:
@@ -67,24 +63,26 @@ def _lines(measures: Array, lengths: Array) -> tuple[Array, Array]:
 
 def _matched(
     first: tuple[Array, Array], first_markings: Array, second: tuple[Array, Array], second_markings: Array, half: float
-) -> list[tuple[float, float, float, float]]:
-    """Return height and place on the first axis by matches there, and a place on the second; each with a score."""
+) -> Array:
+    """Return heights, places on the first axis by matches there, places on the second, and scores: (n, 4)."""
     scaled = _heights_and_places(first[0], first_markings)
     scores = _score(first, first_markings, *scaled.T)
-    found = []
-    reach = 1.3
-    for n in np.argsort(-scores)[:40]:
-        height, place = scaled[n].tolist()
-        if len(second[0]) and len(second_markings):
-            places = (second_markings[None] - height * second[0][:, None]).ravel()
-            others = _score(second, second_markings, np.full(len(places), height), places)
-            best = np.argsort(-others)[:6]
-            found += [(height, place, float(places[m]), float(scores[n] + others[m])) for m in best]
-        else:
-            # Nothing measures the second axis.
-            places = np.linspace(-reach * half, reach * half, 14)
-            found += [(height, place, float(other), float(scores[n])) for other in places]
-    return found
+    best = np.argsort(-scores)[:40]
+    scaled, scores = scaled[best], scores[best]
+    if len(second[0]) and len(second_markings):
+        shape = len(best), len(second[0]) * len(second_markings)
+        places = (second_markings - scaled[:, :1, None] * second[0][:, None]).reshape(shape)
+        heights = np.repeat(scaled[:, 0], shape[1])
+        others = _score(second, second_markings, heights, places.ravel()).reshape(places.shape)
+        chosen = np.argsort(-others, axis=1)[:, :6]
+        places, others = (np.take_along_axis(values, chosen, axis=1) for values in (places, others))
+    else:
+        # Nothing measures the second axis.
+        reach = 1.3
+        places = np.tile(np.linspace(-reach * half, reach * half, 14), (len(best), 1))
+        others = np.zeros_like(places)
+    found = np.stack(np.broadcast_arrays(scaled[:, :1], scaled[:, 1:], places, scores[:, None] + others), axis=-1)
+    return found.reshape(-1, 4)
 
 
 def _heights_and_places(measures: Array, markings: Array) -> Array:

@@ -90,11 +90,15 @@ class LineView:
         inside = (np.abs(at - np.stack([column, row], axis=-1)) <= 0.5).all(axis=-1)
         return self.nearest[row, column] - at, inside & self.covered[row, column]
 
-    def normals(self, focal_px: float) -> Array:
-        """Return unit normals (S, 3), in the camera's frame, of the planes through the camera and each segment."""
-        one = np.ones((len(self.starts), 1))
-        normal = np.cross(np.c_[self.starts / focal_px, one], np.c_[self.ends / focal_px, one])
-        return np.asarray(normal / np.linalg.norm(normal, axis=1, keepdims=True))
+    def normals(self, focal_px: Array) -> Array:
+        """Return unit normals (..., S, 3), in the camera's frame, of the planes through the camera and each segment.
+
+        For focal lengths (...).
+        """
+        (x, y), (other_x, other_y) = self.starts.T, self.ends.T
+        beyond = (x * other_y - y * other_x) / focal_px[..., None]
+        normal = np.stack(np.broadcast_arrays(y - other_y, other_x - x, beyond), axis=-1)
+        return np.asarray(normal / np.linalg.norm(normal, axis=-1, keepdims=True))
 
 
 def _border(lens: Lens) -> Array:

@@ -5,7 +5,7 @@ the plane is perpendicular to it. Long segments vote for rotations whose x or y 
 is what vanishing points say, without having to choose which segments meet in one.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -64,7 +64,7 @@ def _peaks(view: LineView, focal: float, count: int) -> list[Direction]:
     level = np.stack(np.meshgrid(*axes, [0.0], indexing="ij"), axis=-1).reshape(-1, 3)
     # Roll by roll: all of the grid at once takes hundreds of megabytes.
     rolled = [level + [0.0, 0.0, roll] for roll in np.arange(-most_roll, most_roll + step / 2, step)]
-    votes = np.concatenate([_votes(view, directions, focal, 0.02) for directions in rolled])
+    votes = np.concatenate([_votes(view, directions, np.array([focal]), 0.02)[0] for directions in rolled])
     directions = np.concatenate(rolled)
     peaks = list[Direction]()
     for n in np.argsort(-votes)[: 60 * count]:
@@ -80,34 +80,34 @@ def _climbed(view: LineView, start: Direction, frees_focal: bool, rng: np.random
     """Return the best direction near a peak, by narrower votes."""
     # Angle, rad, between a direction and the plane of a segment at which its vote is 1/e.
     tolerance_rad = 0.006
-    best = Direction(
-        start.pan_tilt_roll,
-        start.focal_px,
-        float(_votes(view, start.pan_tilt_roll[None], start.focal_px, tolerance_rad)[0]),
-    )
+    (votes,) = _votes(view, start.pan_tilt_roll[None], np.array([start.focal_px]), tolerance_rad)
+    best = replace(start, votes=float(votes[0]))
     for number in range(7):
         narrower = 0.6**number
         spread = np.radians(1.4) * narrower
         offspring = best.pan_tilt_roll + spread * rng.normal(size=(48, 3))
-        tried = [best.focal_px]
-        if frees_focal:
-            tried += list(best.focal_px * np.exp(0.06 * narrower * rng.normal(size=5)))
-        for focal in tried:
-            votes = _votes(view, offspring, focal, tolerance_rad)
-            if votes.max() > best.votes:
-                best = Direction(offspring[votes.argmax()], focal, float(votes.max()))
+        more = best.focal_px * np.exp(0.06 * narrower * rng.normal(size=5)) if frees_focal else np.zeros(0)
+        tried = np.array([best.focal_px, *more])
+        votes = _votes(view, offspring, tried, tolerance_rad)
+        focal, one = np.unravel_index(votes.argmax(), votes.shape)
+        if votes[focal, one] > best.votes:
+            best = Direction(offspring[one], float(tried[focal]), float(votes[focal, one]))
     return best
 
 
-def _votes(view: LineView, pan_tilt_roll: Array, focal: float, tolerance: float) -> Array:
-    """Return, for each direction (P, 3), the share of all segments that runs along x or y, less for its roll."""
-    rotations = rotations_of(*pan_tilt_roll.T).astype(np.float32)
-    normals = view.normals(focal).astype(np.float32)
+def _votes(view: LineView, pan_tilt_roll: Array, focal_px: Array, tolerance: float) -> Array:
+    """Return the share of all segments that runs along x or y, less for its roll: (F, P).
+
+    For each focal length (F,) of each direction (P, 3).
+    """
+    axes = rotations_of(*pan_tilt_roll.T)[:, :, :2].transpose(2, 0, 1).astype(np.float32)
+    normals = view.normals(focal_px).astype(np.float32)
     lengths = view.lengths
-    off = np.minimum(np.abs(rotations[:, :, 0] @ normals.T), np.abs(rotations[:, :, 1] @ normals.T))
+    along_x, along_y = np.abs(axes[:, None] @ normals.transpose(0, 2, 1))
+    share = np.exp(-((np.minimum(along_x, along_y) / tolerance) ** 2)) @ (lengths / lengths.sum())
     # Votes that a roll of one standard deviation costs.
     rolled = 0.02 * (pan_tilt_roll[:, 2] / view.roll_sigma) ** 2
-    return np.asarray(np.exp(-((off / tolerance) ** 2)) @ lengths / lengths.sum() - rolled)
+    return np.asarray(share - rolled)
 
 
 def _turned(one: Array, other: Array) -> float:
