@@ -10,7 +10,6 @@ import numpy as np
 from worker.calibration.detection.contrast import Channels
 from worker.calibration.detection.evidence import Evidence, evidence_of
 from worker.calibration.detection.exclusions import left_out, of_use
-from worker.calibration.detection.line_measurement import Measurements
 from worker.calibration.detection.ridge_response import ridge_response
 from worker.calibration.diagnostics.markings import report_markings
 from worker.calibration.diagnostics.overlap import overlap_of
@@ -29,6 +28,7 @@ from worker.calibration.refinement.refine import (
     LineReader,
     Observations,
     evaluate_poses,
+    measured_shares,
     refine,
 )
 from worker.calibration.refinement.uncertainty import Deviation, RefinedPose, RefinedPoses
@@ -282,16 +282,7 @@ def shows_most_lines(pitch: Field, cameras: Sequence[Camera], reader: LineReader
     """Say of each camera whether its frame shows most of the lines near to where the camera expects them."""
     lines = pitch.line_points()
     measured = reader.measure(lines, cameras, SEARCH_PX[0])
-    return [
-        _measured_share(VisibleLines.from_camera(lines, camera), found) >= LEAST_CAUGHT
-        for camera, found in zip(cameras, measured, strict=True)
-    ]
-
-
-def _measured_share(expected: VisibleLines, found: Measurements) -> float:
-    """Return the share 0..1 of the expected length that was measured; lines below a pixel count by their width."""
-    weight = expected.length_px * np.minimum(expected.width_px, 1.0)
-    return float(np.sum(weight[np.isin(expected.index, found.index)]) / max(np.sum(weight), 1e-12))
+    return [share >= LEAST_CAUGHT for share in measured_shares(lines, cameras, measured)]
 
 
 def is_confirmed(problem: Problem, number: int, result: CameraResult) -> bool:

@@ -18,6 +18,7 @@ from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.field import Field, LinePoints
 from worker.calibration.geometry.ground import Ground
 from worker.calibration.geometry.parameters import Parameter, field_measures
+from worker.calibration.geometry.visibility import VisibleLines
 from worker.calibration.memory.camera_memory import CameraMemory, memories_of_field
 from worker.calibration.memory.repainted_markings import find_repainted_markings
 from worker.calibration.refinement.anderson_mixing import MixedSteps
@@ -32,7 +33,7 @@ SEARCH_PX = (14.0, 8.0, 5.0)
 """Half width of the search for lines round by round, in pixels of a 4K frame."""
 EVALUATION_SEARCH_PX = 8.0
 CLEARLY_MORE = 0.02
-"""Growth of the agreement with the lines that counts."""
+"""Growth of the share of lines that are found, by which one pose is better than another."""
 MOST_STEPS = 4
 """Most steps of a coarse round."""
 NOT_LOOKED_AT: NDArray[np.float32] = np.zeros((1, 1), dtype=np.float32)
@@ -177,9 +178,13 @@ class _Refiner:
             estimate = this.towards_tukey(estimate, measured).to
         return estimate
 
-    def agreement(self, estimate: Estimate) -> float:
-        """Return the agreement 0..1 of the frames with the lines where the cameras put them: the best camera's."""
-        return max(one.agreement for one in self.evidence(estimate))
+    def share_found(self, estimate: Estimate) -> float:
+        """Return the share 0..1 of its lines that is found where the camera with the largest share expects them."""
+        lines = estimate.on_ground(self.unknowns)
+        measured = self.reader.measure(lines, estimate.cameras, SEARCH_PX[-1])
+        share = max(measured_shares(lines, estimate.cameras, measured))
+        # What is not measured may yet be seen, which takes longer to tell.
+        return share if share > 0.5 else max(one.agreement for one in self.evidence(estimate))
 
     def evidence(self, estimate: Estimate) -> list[Evidence]:
         """Return the evidence for the lines of the field where the cameras put them."""
@@ -193,7 +198,7 @@ class _Refiner:
         at the poses that the last reading led to, until that moves nothing: the end does not depend on the beginning.
         Poses that miss more lines than they find are no answer, and are left where a reading leads to no more lines.
         """
-        moves, agreement = list[float](), self.agreement(estimate)
+        moves, share = list[float](), self.share_found(estimate)
         self.reader.read_anew()
         for _ in range(6):
             last = replace(self.around(estimate), found=estimate.cameras).follow(estimate)
@@ -204,9 +209,9 @@ class _Refiner:
             # fifth of it: they have arrived where the next one would move them less than 0.1 mm.
             if moves[-1] * max(nearer, 0.2) < 1e-4:
                 break
-            if agreement <= 0.5:
-                before, agreement = agreement, self.agreement(estimate)
-                if agreement < before + CLEARLY_MORE:
+            if share <= 0.5:
+                before, share = share, self.share_found(estimate)
+                if share < before + CLEARLY_MORE:
                     break
             self.reader.read_anew()
         return last
@@ -250,6 +255,19 @@ class _Refiner:
         # A lens or a field that is wrong bends lines as a swelling ground does: the more of it, the flatter the ground.
         uneven /= 1 + (max(found.misfit_px for found in measured) / 0.3) ** 2
         return replace(made, to=replace(made.to, uneven_m=min(uneven, self.unknowns.ground.most_m)))
+
+
+def measured_shares(lines: LinePoints, cameras: Sequence[Camera], measured: Sequence[Measurements]) -> list[float]:
+    """Return the share 0..1 of the length of line that each camera expects, and was measured.
+
+    Lines below a pixel count by their width.
+    """
+    shares = []
+    for camera, found in zip(cameras, measured, strict=True):
+        expected = VisibleLines.from_camera(lines, camera)
+        weight = expected.length_px * np.minimum(expected.width_px, 1.0)
+        shares.append(float(np.sum(weight[np.isin(expected.index, found.index)]) / max(np.sum(weight), 1e-12)))
+    return shares
 
 
 def _repainted_in_memory(remembered: Sequence[CameraMemory | None]) -> NDArray[np.intp]:
