@@ -8,7 +8,6 @@ from pathlib import Path
 from pydantic import BaseModel
 
 from service.cli.printing import ACCEPTED, CANNOT_TELL, FAILED, REJECTED, print_note, print_rows
-from service.client import Client
 from service.schemas.check import CheckResult, Grade
 from service.schemas.health import VenueHealth
 from service.schemas.job import Job
@@ -65,9 +64,8 @@ def write_pictures(folder: Path, pictures: Mapping[str, bytes]) -> None:
         (folder / picture_file(name.replace("/", "_"))).write_bytes(picture)
 
 
-def print_submitted(client: Client, job: Job, *, as_json: bool) -> None:
+def print_submitted(job: Job, url: str, *, as_json: bool) -> None:
     """Print the address of a submitted job."""
-    url = client.url_of(job.links["self"])
     if as_json or not sys.stdout.isatty():
         print(json.dumps({"job": job.id, "url": url}, indent=2))
     else:

@@ -18,8 +18,8 @@ from service.cli.arguments import (
     parse_frame_files,
     parse_options,
 )
-from service.cli.progress import end_with_job
 from service.cli.service_client import open_client
+from service.cli.waiting import end_with_job
 from service.schemas.file_kinds import PNG_START
 
 

@@ -24,8 +24,8 @@ from service.cli.arguments import (
     require_yes,
 )
 from service.cli.printing import FAILED, USAGE, fail, print_rows, write_document
-from service.cli.progress import end_with_job
 from service.cli.service_client import open_client
+from service.cli.waiting import end_with_job
 from service.client import Client, Refused
 from service.schemas.job import Jobs, newest_failed
 from service.schemas.names import JobKind, JobStatus

@@ -32,8 +32,8 @@ from service.cli.arguments import (
 )
 from service.cli.local_engine import checked_files, engine_progress, engine_settings
 from service.cli.printing import FAILED, REJECTED, USAGE, fail
-from service.cli.progress import follow_to_end
 from service.cli.service_client import open_client
+from service.cli.waiting import follow_to_end
 from service.intake import image_checks
 from service.schemas.geometry import LensFile, Pose, PoseIn
 from service.schemas.names import ID_PATTERN, BoardLensModel

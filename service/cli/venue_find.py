@@ -24,8 +24,8 @@ from service.cli.arguments import (
     parse_frame_files,
 )
 from service.cli.printing import USAGE, fail, print_note
-from service.cli.progress import follow_to_end
 from service.cli.service_client import open_client
+from service.cli.waiting import follow_to_end
 from service.schemas.find import SoughtSite
 from service.schemas.names import FieldNumber
 from service.schemas.options import FindOptions
@@ -121,7 +121,7 @@ def find_cameras(
     with open_client(url, api_key) as client:
         job = client.find(venue, files, find_options.model_dump(mode="json", exclude_unset=True), sought, key)
         if not (wait or adopt_them or pictures):
-            print_submitted(client, job, as_json=as_json)
+            print_submitted(job, client.url_of(job.links["self"]), as_json=as_json)
             return
         job = follow_to_end(client, job)
         print_answer(job, as_json=as_json)
