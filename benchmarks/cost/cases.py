@@ -45,6 +45,8 @@ def case(cameras: str, start: str) -> Case:
 def _demo(start: str) -> Case:
     venue, truth = (json.loads((DEMO / name).read_text()) for name in ("venue.json", "truth.json"))
     name = f"demo-{start}"
+    # Releases before 0.3.0 do not know it.
+    del venue["field"]["sigma"]
     for number, camera in enumerate(venue["cameras"]):
         camera["pose"] = pose_document(_stored(_pose(truth["poses"][camera["id"]]), start, number))
     files = {camera["id"]: (DEMO / f"{camera['id']}.jpg").read_bytes() for camera in venue["cameras"]}
