@@ -22,7 +22,7 @@ from benchmarks.seam_people.methods import RARELY, Method, methods, shown_by
 from benchmarks.seam_people.scores import Lines, Score, truths
 from worker.calibration.geometry.camera import Array, Frame
 from worker.calibration.stitching.panorama import Panorama, panorama
-from worker.calibration.stitching.people_seam import shows_turf
+from worker.calibration.stitching.people_seam import shows_field
 from worker.calibration.stitching.photometric_alignment import evened_out
 from worker.calibration.stitching.views import StitchedView, ViewChoice, chosen_view
 
@@ -57,7 +57,7 @@ def _of_rig(rig: Rig, asked: argparse.Namespace) -> dict[str, float]:
     lines = Lines(made, view, stored, rig.cameras())
     compared = [
         one
-        for one in methods(made, shows_turf(FIELD, view))
+        for one in methods(made, shows_field(FIELD, view))
         if not asked.methods or any(map(one.name.startswith, asked.methods))
     ]
     scores = {one.name: Score(one.every / RATE) for one in compared}

@@ -34,7 +34,7 @@ NOISE, NIGHT_NOISE, EXPOSURE = 2.0, 4.0, 0.06
 
 @dataclass(frozen=True)
 class Rig:
-    """Cameras along a side, `apart` metres from one to the next, 12 m high."""
+    """Cameras along a side, `apart` metres from one to the next, `behind` the field's middle and `high`, in metres."""
 
     name: str
     count: int
@@ -42,6 +42,8 @@ class Rig:
     focal: float
     aims: Sequence[tuple[float, float]]
     night: bool = False
+    behind: float = 48.0
+    high: float = 12.0
 
     def cameras(self) -> list[Camera]:
         """Return the cameras as they stand."""
@@ -51,7 +53,7 @@ class Rig:
             Camera(
                 f"camera{number + 1}",
                 lens,
-                Pose.looking_at([self.apart * (number - (self.count - 1) / 2), -48.0, 12.0], [*aim, 0.0]),
+                Pose.looking_at([self.apart * (number - (self.count - 1) / 2), -self.behind, self.high], [*aim, 0.0]),
             )
             for number, aim in enumerate(self.aims)
         ]
@@ -64,6 +66,7 @@ RIGS = (
     Rig("2 m, night", 2, 2.0, 777, TWO, night=True),
     Rig("8 m", 2, 8.0, 777, ((-25.0, -17.0), (25.0, -17.0))),
     Rig("40 m", 2, 40.0, 667, ((-15.0, -10.0), (15.0, -10.0))),
+    Rig("1 m, narrow overlap", 2, 1.0, 777, ((-15.0, -24.0), (15.0, -24.0)), behind=39.0, high=4.0),
     Rig("3 cameras, 4 m", 3, 4.0, 933, ((-30.0, -22.0), (0.0, -8.0), (30.0, -22.0))),
     Rig("4 cameras, 12 m, night", 4, 12.0, 933, ((-36.0, -20.0), (-12.0, -12.0), (12.0, -12.0), (36.0, -20.0)), True),
 )

@@ -45,7 +45,7 @@ class Method:
         return found
 
 
-def methods(made: Panorama, turf: NDArray[np.bool_]) -> list[Method]:
+def methods(made: Panorama, on_pitch: NDArray[np.bool_]) -> list[Method]:
     """Return the seams of a panorama."""
     static = [part.weight for part in made.parts]
     seen = [inside(part.source, part.frame_size, 1.0) for part in made.parts]
@@ -57,7 +57,7 @@ def methods(made: Panorama, turf: NDArray[np.bool_]) -> list[Method]:
         Method(
             "GraphCut", lambda shown: _opencv(cv2.detail.GraphCutSeamFinder("COST_COLOR_GRAD"), shown, seen), RARELY
         ),
-        Method("people", _People(made, turf)),
+        Method("people", _People(made, on_pitch)),
     ]
 
 
@@ -75,8 +75,8 @@ def shown_by(
 class _People:
     """The seams of `esc stitch --seam people`."""
 
-    def __init__(self, made: Panorama, turf: NDArray[np.bool_]) -> None:
-        self._made, self._bands = made, seam_bands(made, turf, RATE)
+    def __init__(self, made: Panorama, on_pitch: NDArray[np.bool_]) -> None:
+        self._made, self._bands = made, seam_bands(made, on_pitch, RATE)
 
     def __call__(self, shown: Sequence[NDArray[np.float32]]) -> Weights:
         weights = [part.weight.copy() for part in self._made.parts]

@@ -27,7 +27,7 @@ from benchmarks.seam_people.game import FIELD, RATE, RIGS, Game, calibrated
 from benchmarks.seam_people.game import SIZE as GAME_SIZE
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.stitching.panorama import panorama
-from worker.calibration.stitching.people_seam import SeamBand, seam_bands, shows_turf
+from worker.calibration.stitching.people_seam import SeamBand, seam_bands, shows_field
 from worker.calibration.stitching.photometric_alignment import evened_out
 from worker.calibration.stitching.views import ViewChoice, chosen_view
 from worker.video import moving_seams, renderer
@@ -101,7 +101,7 @@ def _parts(cameras: list[Camera], clips: Mapping[str, str], choice: ViewChoice, 
         lights = evened_out(FIELD, cameras, {camera: one[0].colours for camera, one in shots.items()})
         view = chosen_view(FIELD, cameras, choice)
         made = panorama(FIELD, view, cameras, lights)
-        seams = moving_seams.MovingSeams(made, seam_bands(made, shows_turf(FIELD, view), RATE))
+        seams = moving_seams.MovingSeams(made, seam_bands(made, shows_field(FIELD, view), RATE))
         making = renderer.Renderer(made, 1, seams)
         views = [av.VideoFrame(*view.size, "yuv420p") for _ in range(count)]
         with _timed(here, "the other rendering"), _timed_parts(here):

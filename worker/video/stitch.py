@@ -23,7 +23,7 @@ from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.field import Field
 from worker.calibration.stitching.coverage import Unseen, unseen_part
 from worker.calibration.stitching.panorama import Panorama, panorama
-from worker.calibration.stitching.people_seam import MODEL, seam_bands, shows_turf
+from worker.calibration.stitching.people_seam import MODEL, seam_bands, shows_field
 from worker.calibration.stitching.photometric_alignment import evened_out
 from worker.calibration.stitching.photometry import Light
 from worker.calibration.stitching.views import StitchedView, ViewChoice, chosen_view
@@ -222,8 +222,8 @@ def stitch(
         expected = _expected(ends, moments.begin_s, rate, plan)
         sound = None if sound_clip is None else Sound(sound_clip, moments.begin_s - offsets[sound_clip.camera])
         with Writer(plan.output, view.size, rate, plan.encoding, sound) as writer:
-            turf = shows_turf(scene.pitch, view) if plan.seam == "people" else None
-            renderers = RendererFactory(turf, float(rate), plan.threads, max(follow.border, MODEL.frame_border))
+            on_pitch = shows_field(scene.pitch, view) if plan.seam == "people" else None
+            renderers = RendererFactory(on_pitch, float(rate), plan.threads, max(follow.border, MODEL.frame_border))
             for made in _rendered(moments, geometry, view.size, writer, renderers):
                 if moments.count == 1:
                     begun(unseen_part(made.seen))
@@ -245,20 +245,20 @@ def stitch(
 class RendererFactory:
     """Makes renderers of panoramas.
 
-    `turf` (H, W): `shows_turf`, if seams go around people; `border`: of frames, that is not shown
+    `on_pitch` (H, W): `shows_field`, if seams go around people; `border`: of frames, that is not shown
     then, in their widths.
     """
 
-    turf: NDArray[np.bool_] | None
+    on_pitch: NDArray[np.bool_] | None
     rate: float
     threads: int
     border: float
 
     def __call__(self, panorama: Panorama) -> Renderer:
         """Return the renderer of a panorama."""
-        if self.turf is None:
+        if self.on_pitch is None:
             return Renderer(panorama, self.threads)
-        seams = MovingSeams(panorama, seam_bands(panorama, self.turf, self.rate, self.border))
+        seams = MovingSeams(panorama, seam_bands(panorama, self.on_pitch, self.rate, self.border))
         return Renderer(panorama, self.threads, seams)
 
 

@@ -10,7 +10,7 @@ import pytest
 from testbed.synthetic import moved
 from tests.worker.video.filming import PITCH, PLAYER, cameras, empty, frame_at
 from worker.calibration.stitching.panorama import BACKDROP, Panorama, panorama
-from worker.calibration.stitching.people_seam import seam_bands, shows_turf
+from worker.calibration.stitching.people_seam import seam_bands, shows_field
 from worker.calibration.stitching.photometry import Light
 from worker.calibration.stitching.views import ViewChoice, chosen_view
 from worker.video.moving_seams import MovingSeams
@@ -124,7 +124,7 @@ def test_every_format_becomes_the_same_colours(form, matrix, full):
 def people_seams():
     view = chosen_view(PITCH, cameras, ViewChoice(width=960))
     shown = panorama(PITCH, view, cameras)
-    return shown, Renderer(shown, seams=MovingSeams(shown, seam_bands(shown, shows_turf(PITCH, view), 25)))
+    return shown, Renderer(shown, seams=MovingSeams(shown, seam_bands(shown, shows_field(PITCH, view), 25)))
 
 
 def rendered_by(renderer, size, frames):

@@ -34,10 +34,10 @@ class SeamModel:
     border of a frame, in its widths, is half outside of it. `margin`: cells over which one camera passes into the other
     beside people; `clear`: cells beyond the seam from which on a person changes the camera. `faint`, `outright`:
     differences that are of people, in mean differences, and at least, as the sum of three colours' levels; faint ones
-    count where they hang together with more outright ones than noise makes, `speck_cells`. `line_step_m`: distance of
-    points on lines, which take `line_px` of the view: a near line, and its blurred borders. `ground_s`, `standing_s`:
-    seconds in which what stays becomes a part of the ground, where nobody is, and where somebody stands. `crowd`: share
-    of a band above which it does not differ because of people: a light went on, or a camera changed its exposure.
+    count where they hang together with more outright ones than noise makes, `speck_cells`. `astray`: cells by which two
+    calibrated cameras may show a line apart. `ground_s`, `standing_s`: seconds in which what stays becomes a part of
+    the ground, where nobody is, and where somebody stands. `crowd`: share of a band above which it does not differ
+    because of people: a light went on, or a camera changed its exposure.
     """
 
     cell_px: int = 2
@@ -49,8 +49,7 @@ class SeamModel:
     faint: tuple[float, float] = (3.0, 6.0)
     outright: tuple[float, float] = (6.0, 12.0)
     speck_cells: int = 2
-    line_step_m: float = 0.1
-    line_px: int = 15
+    astray: float = 0.125
     ground_s: float = 1.0
     standing_s: float = 30.0
     crowd: float = 0.6
@@ -64,8 +63,8 @@ class SeamBand:
     """Band of a view along the seam of two cameras, on a grid of cells, and its memory.
 
     `cameras`: their numbers; `cell_px`; `around`: rows and columns of cells in the view; `zone` (h, w): 1 in the band;
-    `second` (h, w): 1 where the second camera is the better one; `turf` (h, w): 1 on the field beside its lines.
-    `rate`: of moments, a second.
+    `second` (h, w): 1 where the second camera is the better one; `pitch` (h, w): 1 on the field. `rate`: of moments, a
+    second.
     """
 
     cameras: tuple[int, int]
@@ -73,7 +72,7 @@ class SeamBand:
     around: tuple[slice, slice]
     zone: Mask
     second: Mask
-    turf: Mask
+    pitch: Mask
     rate: float
     _ground: Values | None = field(default=None, init=False)
     _noise: Values = field(init=False)
@@ -101,13 +100,13 @@ class SeamBand:
         The first answer (h, w) is 1 in hulls of people, falling to 0 around them; the second is there how much the
         second camera counts.
         """
-        difference = np.asarray(cv2.blur(first - second, (3, 3)), np.float32)
+        first, second = (np.asarray(cv2.blur(values, (3, 3)), np.float32) for values in (first, second))
+        difference = first - second
         if self._ground is None:
-            self._begin(difference)
+            self._begin(difference, np.minimum(_steepness(first), _steepness(second)))
         apart = self._apart(difference)
         faint, outright = (
-            ((apart > np.maximum(means * self._noise, levels)) & (self.zone > 0)).astype(np.uint8)
-            for means, levels in (MODEL.faint, MODEL.outright)
+            (self._is_apart(apart, least) & (self.zone > 0)).astype(np.uint8) for least in (MODEL.faint, MODEL.outright)
         )
         if np.count_nonzero(faint) > MODEL.crowd * np.count_nonzero(self.zone):
             self._ground, faint = difference, np.zeros_like(faint)
@@ -118,17 +117,26 @@ class SeamBand:
         self._labels, self._hulls = self._labelled(people, hulls), hulls
         return self._blended(hulls, self._labels)
 
-    def _begin(self, difference: Values) -> None:
-        """Take lines and what stands beyond the field as ground; people may be on the field from the first on."""
-        on_turf = (self.zone & self.turf) > 0
-        usual = np.median(difference[on_turf], axis=0) if on_turf.any() else 0.0
-        self._ground = np.where(self.turf[..., None] > 0, np.float32(usual), difference)
+    def _begin(self, difference: Values, steepness: Values) -> None:
+        """Take for ground what stands beyond the field, and on it what a line shown a little apart makes.
+
+        People may be on the field from the first on; a line is as steep in both cameras' pictures (h, w, 3).
+        """
+        on_pitch = (self.zone & self.pitch) > 0
+        usual = np.median(difference[on_pitch], axis=0) if on_pitch.any() else 0.0
+        self._ground = np.where(self.pitch[..., None] > 0, np.float32(usual), difference)
         apart = self._apart(difference)
-        self._noise = np.full(self.zone.shape, np.median(apart[on_turf]) if on_turf.any() else 0.0, np.float32)
+        self._noise = np.full(self.zone.shape, np.median(apart[on_pitch]) if on_pitch.any() else 0.0, np.float32)
+        reach = MODEL.astray * steepness * self._is_apart(apart, MODEL.faint)[..., None]
+        self._ground += np.clip(difference - self._ground, -reach, reach)
 
     def _apart(self, difference: Values) -> Values:
         assert self._ground is not None
         return np.asarray(cv2.transform(cv2.absdiff(difference, self._ground), np.ones((1, 3))), np.float32)
+
+    def _is_apart(self, apart: Values, least: tuple[float, float]) -> NDArray[np.bool_]:
+        means, levels = least
+        return np.asarray(apart > np.maximum(means * self._noise, levels))
 
     def _learn(self, difference: Values, apart: Values, taken: Mask) -> None:
         """Follow the ground, hardly where it is taken."""
@@ -177,26 +185,19 @@ class SeamBand:
         return around, np.asarray(second / np.maximum(people, np.float32(1e-6)), np.float32)
 
 
-def shows_turf(pitch: Field, view: StitchedView) -> NDArray[np.bool_]:
-    """Return which pixels (H, W) of a view show the field and no line of it.
-
-    Two cameras show a line a little apart from the first moment on, as they show what stands beyond the field.
-    """
+def shows_field(pitch: Field, view: StitchedView) -> NDArray[np.bool_]:
+    """Return which pixels (H, W) of a view show the field."""
     ground = np.abs(view.behind(pitch, every_nth_pixel(view.size))[..., :2])
     on_pitch = (ground < [pitch.length / 2, pitch.width / 2]).all(axis=-1)
-    pixels = view.project(pitch.line_points(MODEL.line_step_m).position)
-    columns, rows = np.rint(pixels[inside(pixels, view.size)]).astype(int).T
-    painted = np.zeros((view.size[1], view.size[0]), np.uint8)
-    painted[rows, columns] = 1
-    return (every_pixel(np.asarray(on_pitch), view.size) > 0.5) & (cv2.dilate(painted, _square(MODEL.line_px)) == 0)
+    return every_pixel(np.asarray(on_pitch), view.size) > 0.5
 
 
 def seam_bands(
-    made: Panorama, turf: NDArray[np.bool_], rate: float, border: float = MODEL.frame_border
+    made: Panorama, pitch: NDArray[np.bool_], rate: float, border: float = MODEL.frame_border
 ) -> list[SeamBand]:
     """Return the bands of the seams of a panorama.
 
-    `turf` (H, W): `shows_turf`; `rate`: of moments, a second; `border`: of each frame, in its
+    `pitch` (H, W): `shows_field`; `rate`: of moments, a second; `border`: of each frame, in its
     widths, that is not used.
     """
     cell = MODEL.cell_px * max(1, round(made.size[0] / MODEL.cell_columns))
@@ -217,10 +218,10 @@ def seam_bands(
         if zone.any():
             top_left, bottom_right = _with_border(zone)
             around = slice(top_left[0], bottom_right[0]), slice(top_left[1], bottom_right[1])
-            in_band, second, bare = (
-                np.ascontiguousarray(mask[around], np.uint8) for mask in (zone, owner == j, turf[cells])
+            in_band, second, on_pitch = (
+                np.ascontiguousarray(mask[around], np.uint8) for mask in (zone, owner == j, pitch[cells])
             )
-            found.append(SeamBand((i, j), cell, around, in_band, second, bare, rate))
+            found.append(SeamBand((i, j), cell, around, in_band, second, on_pitch, rate))
     return found
 
 
@@ -284,6 +285,12 @@ def blend_shares(people: Values, second: Values, static: NDArray[np.float32]) ->
     size = static.shape[1], static.shape[0]
     fine, labels = (cv2.resize(part, size, interpolation=cv2.INTER_LINEAR) for part in (people, second))
     return np.asarray(static + np.asarray(fine) * (np.asarray(labels) - static), np.float32)
+
+
+def _steepness(values: Values) -> Values:
+    """Return how much values (h, w, 3) change over a cell, the most of the cells around."""
+    along, down = (np.abs(cv2.Sobel(values, cv2.CV_32F, *axis, scale=1 / 8)) for axis in ((1, 0), (0, 1)))
+    return np.asarray(cv2.dilate(along + down, _square(3)), np.float32)
 
 
 def _square(side: int) -> Mask:

@@ -5,7 +5,7 @@ import pytest
 
 from tests.worker.video.filming import PITCH, cameras
 from worker.calibration.stitching.panorama import panorama
-from worker.calibration.stitching.people_seam import SeamBand, blend_shares, opened, seam_bands, shows_turf
+from worker.calibration.stitching.people_seam import SeamBand, blend_shares, opened, seam_bands, shows_field
 from worker.calibration.stitching.views import ViewChoice, chosen_view
 
 HEIGHT, WIDTH, SEAM = 60, 120, 60
@@ -14,12 +14,12 @@ RATE = 25.0
 LEAN, HALF = 5, 3
 
 
-def band(turf=1):
+def band(pitch=1):
     second = np.zeros((HEIGHT, WIDTH), np.uint8)
     second[:, SEAM:] = 1
     zone = np.ones((HEIGHT, WIDTH), np.uint8)
     zone[:, [0, -1]] = 0
-    return SeamBand((0, 1), 2, (slice(0, HEIGHT), slice(0, WIDTH)), zone, second, turf * np.ones_like(zone), RATE)
+    return SeamBand((0, 1), 2, (slice(0, HEIGHT), slice(0, WIDTH)), zone, second, pitch * np.ones_like(zone), RATE)
 
 
 def person(column, lean, top=20):
@@ -113,8 +113,31 @@ def test_the_seam_passes_between_two(noise):
     assert found[:, 76][25:38].min() > 0.9
 
 
+def with_a_line(values, astray, masks=None):
+    """The same with a line along the seam, which the second camera shows a part of a cell beside its place."""
+    for number, value in enumerate(values):
+        cover = np.clip(2.5 - np.abs(np.arange(WIDTH) - SEAM - number * astray), 0, 1)[None, :, None]
+        lined = value + np.float32(130) * cover.astype(np.float32)
+        value[:] = lined if masks is None else np.where(masks[number][..., None], value, lined)
+    return values
+
+
+def test_a_line_that_cameras_show_a_little_apart_moves_no_seam_from_the_first_picture_on(noise):
+    seam = band()
+    for _ in range(3):
+        assert is_static(seam, share(seam, with_a_line(both([], noise)[0], 0.1)))
+
+
+def test_who_stands_on_a_line_in_the_first_picture_is_shown_whole(noise):
+    seam = band()
+    for _ in range(3):
+        values, masks = both([SEAM], noise)
+        found = drawn(share(seam, with_a_line(values, 0.1, masks)), masks)
+        assert min(np.abs(found - mask).sum() for mask in masks) < 0.02 * masks[0].sum()
+
+
 def test_what_stands_beyond_the_field_from_the_first_on_moves_no_seam(noise):
-    seam = band(turf=0)
+    seam = band(pitch=0)
     values, _ = both([SEAM], noise)
     assert is_static(seam, share(seam, values))
 
@@ -130,7 +153,7 @@ def test_a_light_that_goes_on_moves_no_seam(noise):
 def test_bands_lie_where_both_cameras_see():
     view = chosen_view(PITCH, cameras, ViewChoice(width=480))
     made = panorama(PITCH, view, cameras)
-    (found,) = seam_bands(made, shows_turf(PITCH, view), RATE)
+    (found,) = seam_bands(made, shows_field(PITCH, view), RATE)
     weights = opened(made, [found])
     zone = (weights[0] == 0.5) & (weights[1] == 0.5)
     assert zone.any(axis=1).mean() > 0.9
