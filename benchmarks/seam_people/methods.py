@@ -82,9 +82,9 @@ class _People:
         weights = [part.weight.copy() for part in self._made.parts]
         for band in self._bands:
             rows, columns = band.pixels
+            size = band.zone.shape[::-1]
             first, second = (
-                np.ascontiguousarray(shown[number][rows, columns][:: band.cell_px, :: band.cell_px])
-                for number in band.cameras
+                cv2.resize(shown[number][rows, columns], size, interpolation=cv2.INTER_AREA) for number in band.cameras
             )
             i, j = band.cameras
             weights[j][rows, columns] = blend_shares(*band.update(first, second), weights[j][rows, columns])

@@ -37,7 +37,7 @@ class MovingSeams:
     def levels(self) -> Sequence[tuple[int, int]]:
         """Cameras and the levels of detail at which they are sampled."""
         return [
-            (number, level + 1)
+            (number, level)
             for band, levels in zip(self._bands, self._levels, strict=True)
             for number, level in zip(band.cameras, levels, strict=True)
         ]
@@ -58,33 +58,43 @@ class MovingSeams:
 
 @dataclass(frozen=True)
 class _Sampler:
-    """Samples the cells (h, w) of a band from a camera's planes, evened out with the other cameras'."""
+    """Samples the cells (h, w) of a band from a camera's planes, evened out with the other cameras'.
+
+    Luma of a cell is the mean of four places (2h, 2w), so that thin lines do not move with the pixels of a frame.
+    """
 
     level: int
-    places: Map
+    luma: Map
+    chroma: Map
     tones: NDArray[np.uint8]
     rise: NDArray[np.float32]
 
     @classmethod
     def of(cls, part: Contribution, band: SeamBand, level: int) -> "_Sampler":
         """Return the sampler of a camera."""
-        cells = part.source[band.pixels][:: band.cell_px, :: band.cell_px]
+        cells = _places(part, band)
         tones = np.clip(np.rint(part.light.tones), 0, 255).astype(np.uint8)[:, None]
         rise = np.repeat(part.light.rise(cells, part.frame_size)[..., None], 3, axis=-1)
-        return cls(level, sampling_map(cells, level + 1), tones, rise)
+        return cls(level, sampling_map(_places(part, band, 2), level), sampling_map(cells, level + 1), tones, rise)
 
     def values(self, levels: Mapping[int, Planes]) -> Values:
         """Return blue, green, red (h, w, 3) of a frame at each level of detail."""
-        # Luma of the next level has the pixels of this one's chroma.
-        planes = levels[self.level + 1][0], *levels[self.level][1:]
-        sampled = [sample_plane(plane, self.places) for plane in planes]
-        colours = cv2.LUT(cv2.transform(cv2.merge(sampled), FROM_PLANES), self.tones)
-        return np.asarray(cv2.multiply(colours.astype(np.float32), self.rise), np.float32)
+        luma, *colours = levels[self.level]
+        blue, red = (sample_plane(plane, self.chroma) for plane in colours)
+        mean = cv2.resize(sample_plane(luma, self.luma), blue.shape[::-1], interpolation=cv2.INTER_AREA)
+        toned = cv2.LUT(cv2.transform(cv2.merge([mean, blue, red]), FROM_PLANES), self.tones)
+        return np.asarray(cv2.multiply(toned.astype(np.float32), self.rise), np.float32)
+
+
+def _places(part: Contribution, band: SeamBand, finer: int = 1) -> Map:
+    """Return the places in a camera's frame of a band's cells (h, w, 2), or of cells so much finer."""
+    height, width = band.zone.shape
+    size = finer * width, finer * height
+    return np.asarray(cv2.resize(part.source[band.pixels], size, interpolation=cv2.INTER_AREA), np.float32)
 
 
 def _level(part: Contribution, band: SeamBand) -> int:
-    source = part.source[band.pixels]
-    return median_level(source, np.ones(source.shape[:2], bool))
+    return max(0, median_level(_places(part, band), band.zone > 0) - 1)
 
 
 def _static_share(panorama: Panorama, band: SeamBand) -> NDArray[np.float32]:

@@ -18,6 +18,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from worker.calibration.geometry.ground_view import footprint
 from worker.calibration.stitching.panorama import BACKDROP, Contribution, Panorama
 from worker.calibration.stitching.photometry import NEUTRAL, Light
 from worker.video.yuv_planes import BLACK, FROM_PLANES, NO_COLOUR, TO_PLANES, Picture, Plane
@@ -253,8 +254,7 @@ def _stretches(number: int, part: Contribution, rows: slice, shares: Sequence[Sh
 
 def median_level(source: NDArray[np.float32], counts: NDArray[np.bool_]) -> int:
     """Return how often a frame is halved before it is sampled, as the view's resolution allows (see `sampled`)."""
-    (x_down, x_right), (y_down, y_right) = np.gradient(source[..., 0]), np.gradient(source[..., 1])
-    area = float(np.median(np.abs(x_right * y_down - y_right * x_down)[counts]))
+    area = float(np.median(footprint(source[..., 0], source[..., 1])[counts]))
     return int(np.clip(np.floor(0.5 * np.log2(max(area, 1.0))), 0, LARGEST_LEVEL))
 
 

@@ -43,7 +43,7 @@ def sampled(image: NDArray[Any], pixels: NDArray[np.floating[Any]], valid: Mask)
 def level_of_detail(pixels: NDArray[np.floating[Any]]) -> NDArray[np.uint8]:
     """Return how often (H, W) an image is halved before sampling at pixels (H, W, 2), neighbours in a picture."""
     x, y = (np.array(pixels[..., axis], np.float32) for axis in (0, 1))
-    return np.clip(np.floor(0.5 * np.log2(np.maximum(_footprint(x, y), 1.0))), 0, 5).astype(np.uint8)
+    return np.clip(np.floor(0.5 * np.log2(np.maximum(footprint(x, y), 1.0))), 0, 5).astype(np.uint8)
 
 
 def quality(size: tuple[int, int], pixels: Array) -> NDArray[np.float32]:
@@ -54,7 +54,7 @@ def quality(size: tuple[int, int], pixels: Array) -> NDArray[np.float32]:
     x, y = (np.ascontiguousarray(pixels[..., axis], np.float32) for axis in (0, 1))
     width, height = size
     middle = (1 - np.abs(2 * x / (width - 1) - 1)) * (1 - np.abs(2 * y / (height - 1) - 1))
-    found: NDArray[np.float32] = np.maximum(middle, 1e-6) * np.sqrt(np.maximum(_footprint(x, y), 1e-6))
+    found: NDArray[np.float32] = np.maximum(middle, 1e-6) * np.sqrt(np.maximum(footprint(x, y), 1e-6))
     return found
 
 
@@ -75,7 +75,7 @@ def ground_view(pitch: Field, camera: Camera, image: NDArray[Any], grid_xy: Arra
     return sampled(image, pixels, valid), valid & camera.sees(pixels)
 
 
-def _footprint(x: NDArray[np.float32], y: NDArray[np.float32]) -> NDArray[np.float32]:
+def footprint(x: NDArray[np.float32], y: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return the area (H, W) in source pixels of each pixel, from source positions x, y (H, W); 0 where NaN."""
     (x_down, x_right), (y_down, y_right) = np.gradient(x), np.gradient(y)
     return np.nan_to_num(np.abs(x_right * y_down - y_right * x_down), nan=0.0, posinf=0.0)

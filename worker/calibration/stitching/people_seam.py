@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from worker.calibration.geometry.camera import inside
 from worker.calibration.geometry.field import Field
-from worker.calibration.geometry.ground_view import box
-from worker.calibration.stitching.panorama import Panorama, every_nth_pixel, every_pixel
+from worker.calibration.geometry.ground_view import box, footprint
+from worker.calibration.stitching.panorama import Contribution, Panorama, every_nth_pixel, every_pixel
 from worker.calibration.stitching.views import StitchedView
 
 Mask = NDArray[np.uint8]
@@ -29,15 +29,16 @@ Values = NDArray[np.float32]
 class SeamModel:
     """Differences of people from the ground beside a seam, and the ways of seams around them.
 
-    `cell_px`: cell of the grid, in pixels of a view of `cell_columns`. `reach`: distance from a seam, in widths of the
-    view, up to which people are looked for: a near player with arms stretched. `frame_border`: what is nearer to the
-    border of a frame, in its widths, is half outside of it. `margin`: cells over which one camera passes into the other
-    beside people; `clear`: cells beyond the seam from which on a person changes the camera. `faint`, `outright`:
-    differences that are of people, in mean differences, and at least, as the sum of three colours' levels; faint ones
-    count where they hang together with more outright ones than noise makes, `speck_cells`. `astray`: cells by which two
-    calibrated cameras may show a line apart. `ground_s`, `standing_s`: seconds in which what stays becomes a part of
-    the ground, where nobody is, and where somebody stands. `crowd`: share of a band above which it does not differ
-    because of people: a light went on, or a camera changed its exposure.
+    `cell_px`: cell of the grid, in pixels of a view of `cell_columns`, and no finer than those of a frame. `reach`:
+    distance from a seam, in widths of the view, up to which people are looked for: a near player with arms stretched.
+    `frame_border`: what is nearer to the border of a frame, in its widths, is half outside of it. `margin`: cells over
+    which one camera passes into the other beside people; `clear`: cells beyond the seam from which on a person changes
+    the camera. `faint`, `outright`: differences that are of people, in mean differences, and at least, as the sum of
+    three colours' levels; faint ones count where they hang together with more outright ones than noise makes,
+    `speck_cells`. `astray`: cells by which two calibrated cameras may show a line apart. `noise_cells`: side of a
+    square in which noise is alike, larger than anybody. `ground_s`, `standing_s`: seconds in which what stays becomes a
+    part of the ground, where nobody is, and where somebody stands. `crowd`: share of a band above which it does not
+    differ because of people: a light went on, or a camera changed its exposure.
     """
 
     cell_px: int = 2
@@ -50,6 +51,7 @@ class SeamModel:
     outright: tuple[float, float] = (6.0, 12.0)
     speck_cells: int = 2
     astray: float = 0.125
+    noise_cells: int = 41
     ground_s: float = 1.0
     standing_s: float = 30.0
     crowd: float = 0.6
@@ -100,8 +102,7 @@ class SeamBand:
         The first answer (h, w) is 1 in hulls of people, falling to 0 around them; the second is there how much the
         second camera counts.
         """
-        first, second = (np.asarray(cv2.blur(values, (3, 3)), np.float32) for values in (first, second))
-        difference = first - second
+        difference = np.asarray(cv2.blur(first - second, (3, 3)), np.float32)
         if self._ground is None:
             self._begin(difference, np.minimum(_steepness(first), _steepness(second)))
         apart = self._apart(difference)
@@ -127,8 +128,13 @@ class SeamBand:
         self._ground = np.where(self.pitch[..., None] > 0, np.float32(usual), difference)
         apart = self._apart(difference)
         self._noise = np.full(self.zone.shape, np.median(apart[on_pitch]) if on_pitch.any() else 0.0, np.float32)
-        reach = MODEL.astray * steepness * self._is_apart(apart, MODEL.faint)[..., None]
+        is_apart = self._is_apart(apart, MODEL.faint)
+        reach = MODEL.astray * steepness * is_apart[..., None]
         self._ground += np.clip(difference - self._ground, -reach, reach)
+        # Noise differs from place to place: a cell is of many pixels of a frame, or of few.
+        calm = (on_pitch & ~is_apart).astype(np.float32)
+        count, total = (cv2.blur(values, 2 * (MODEL.noise_cells,)) for values in (calm, calm * apart))
+        self._noise = np.where(np.asarray(count) > 0.05, total / np.maximum(count, 0.05), self._noise)
 
     def _apart(self, difference: Values) -> Values:
         assert self._ground is not None
@@ -200,7 +206,7 @@ def seam_bands(
     `pitch` (H, W): `shows_field`; `rate`: of moments, a second; `border`: of each frame, in its
     widths, that is not used.
     """
-    cell = MODEL.cell_px * max(1, round(made.size[0] / MODEL.cell_columns))
+    cell = MODEL.cell_px * max(1, round(made.size[0] / MODEL.cell_columns), *map(_enlargement, made.parts))
     rows, columns = (extent // cell for extent in reversed(made.size))
     cells = slice(0, cell * rows, cell), slice(0, cell * columns, cell)
     owner, reach = made.owner[cells], MODEL.reach * made.size[0] / cell
@@ -223,6 +229,12 @@ def seam_bands(
             )
             found.append(SeamBand((i, j), cell, around, in_band, second, on_pitch, rate))
     return found
+
+
+def _enlargement(part: Contribution) -> int:
+    """Return the view's pixels in a row that one of the camera's frame fills."""
+    areas = footprint(part.source[..., 0], part.source[..., 1])[part.weight > 0]
+    return round(float(np.median(np.maximum(areas, 1e-6))) ** -0.5) if areas.size else 1
 
 
 def opened(made: Panorama, bands: Sequence[SeamBand]) -> list[NDArray[np.float32]]:
@@ -288,9 +300,10 @@ def blend_shares(people: Values, second: Values, static: NDArray[np.float32]) ->
 
 
 def _steepness(values: Values) -> Values:
-    """Return how much values (h, w, 3) change over a cell, the most of the cells around."""
-    along, down = (np.abs(cv2.Sobel(values, cv2.CV_32F, *axis, scale=1 / 8)) for axis in ((1, 0), (0, 1)))
-    return np.asarray(cv2.dilate(along + down, _square(3)), np.float32)
+    """Return by how much values (h, w, 3) differ from one of the cells around at most, evened out."""
+    around = _square(3)
+    rise, fall = cv2.subtract(cv2.dilate(values, around), values), cv2.subtract(values, cv2.erode(values, around))
+    return np.asarray(cv2.blur(cv2.max(rise, fall), (3, 3)), np.float32)
 
 
 def _square(side: int) -> Mask:
