@@ -70,8 +70,9 @@ class Renderer:
         weights = [part.weight for part in panorama.parts] if seams is None else seams.weights
         self._shares = _shares(weights)
         self._views = [_View.of(part) for part in panorama.parts]
+        moves = np.any([one != part.weight for one, part in zip(weights, panorama.parts, strict=True)], axis=0)
         self._strips = [
-            _strip(panorama, self._shares, slice(top, min(top + STRIP_ROWS, height)))
+            _strip(panorama, self._shares, moves, slice(top, min(top + STRIP_ROWS, height)))
             for top in range(0, height, STRIP_ROWS)
         ]
         self._levels = _levels_used(self._strips, len(panorama.parts), [] if seams is None else seams.levels)
@@ -125,11 +126,12 @@ class Renderer:
             here[0][:] = round(BLACK + BACKDROP * 219 / 255)
             here[1][:] = here[2][:] = NO_COLOUR
         for stretch, at in zip(strip.stretches, maps, strict=True):
-            if any(above.min() == 1 for above in stretch.above) or not (
-                stretch.share is None or stretch.share[0].any()
-            ):
-                continue
-            share = None if stretch.share is None or stretch.share[0].min() == 1 else stretch.share
+            share = stretch.share
+            if stretch.moves:
+                least, most = (1, 1) if share is None else cv2.minMaxLoc(share[0])[:2]
+                if most == 0 or any(cv2.minMaxLoc(above)[0] == 1 for above in stretch.above):
+                    continue
+                share = None if least == 1 else share
             columns, half_columns = stretch.columns, _halved(stretch.columns)
             target = here[0][:, columns], here[1][:, half_columns], here[2][:, half_columns]
             view = self._views[stretch.camera]
@@ -171,15 +173,17 @@ class _View:
 class _Stretch:
     """Columns of a strip that show one camera at one level of detail.
 
-    `share`: how much it counts before what is already there, of luma and of each chroma; None: alone. `above` (h, w):
-    opacities of luma of cameras that are drawn over it. `rise`: what its lens takes from the corners: of luma (h, w),
-    of luma at the resolution of chroma (h/2, w/2) and of colours (h/2, w/2, 3), in 255ths of `steepest`.
+    `share`: how much it counts before what is already there, of luma and of each chroma; None: alone. `moves`: if that
+    changes; `above` (h, w): opacities of luma of cameras that are drawn over it. `rise`: what its lens takes from the
+    corners: of luma (h, w), of luma at the resolution of chroma (h/2, w/2) and of colours (h/2, w/2, 3), in 255ths of
+    `steepest`.
     """
 
     camera: int
     level: int
     columns: slice
     share: tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]] | None
+    moves: bool
     above: Sequence[NDArray[np.float32]]
     rise: tuple[Plane, Plane, Plane] | None
     steepest: float
@@ -215,40 +219,41 @@ def _shares(weights: Sequence[NDArray[np.float32]]) -> list[Share]:
     return found
 
 
-def _strip(panorama: Panorama, shares: Sequence[Share], rows: slice) -> _Strip:
+def _strip(panorama: Panorama, shares: Sequence[Share], moves: NDArray[np.bool_], rows: slice) -> _Strip:
     stretches: list[_Stretch] = []
     for number, part in enumerate(panorama.parts):
-        stretches += _stretches(number, part, rows, shares[number:])
+        stretches += _stretches(number, part, rows, shares[number:], moves[rows])
     unseen = ~np.any([share.luma[rows] > 0 for share in shares], axis=0)
     return _Strip(rows, bool(unseen.any()), stretches)
 
 
-def _stretches(number: int, part: Contribution, rows: slice, shares: Sequence[Share]) -> list[_Stretch]:
+def _stretches(
+    number: int, part: Contribution, rows: slice, shares: Sequence[Share], moves: NDArray[np.bool_]
+) -> list[_Stretch]:
     """Return the stretches of a strip where a camera counts, by its share and those of cameras drawn over it.
 
-    Blocks where it is alone are merged; of others, each may be wholly of one camera for a while.
+    Blocks are merged but where seams move (h, w): there each may be wholly of one camera for a while.
     """
     source, share = part.source[rows], shares[0].luma[rows]
     chroma = shares[0].chroma[_halved(rows)]
-    kinds: list[tuple[slice, int, int | None]] = []
+    kinds: list[tuple[slice, int, bool, int | None]] = []
     for left in range(0, share.shape[1], BLOCK_COLUMNS):
         block = slice(left, min(left + BLOCK_COLUMNS, share.shape[1]))
         counts = share[:, block] > 0
-        if not counts.any():
-            kinds.append((block, -1, left))
+        if not counts.any() or any((above.luma[rows, block] == 1).all() for above in shares[1:]):
+            kinds.append((block, -1, False, None))
             continue
-        alone = (share[:, block] == 1).all() and not any(above.luma[rows, block].any() for above in shares[1:])
-        kinds.append((block, median_level(source[:, block], counts), None if alone else left))
+        opaque = bool((share[:, block] == 1).all())
+        kinds.append((block, median_level(source[:, block], counts), opaque, left if moves[:, block].any() else None))
     found = []
-    for (level, _), blocks in groupby(kinds, key=lambda kind: kind[1:]):
+    for (level, opaque, moving), blocks in groupby(kinds, key=lambda kind: kind[1:]):
         if level >= 0:
             together = [block for block, *_ in blocks]
             columns = slice(together[0].start, together[-1].stop)
-            opaque = (share[:, columns] == 1).all()
             own = None if opaque else (share[:, columns], *2 * (chroma[:, _halved(columns)],))
-            above = [one.luma[rows, columns] for one in shares[1:] if one.luma[rows, columns].any()]
-            here = source[:, columns]
-            found.append(_Stretch(number, level, columns, own, above, *_rise(part, here, _between(here, own))))
+            above = [one.luma[rows, columns] for one in shares[1:]]
+            rise = _rise(part, source[:, columns], _between(source[:, columns], own))
+            found.append(_Stretch(number, level, columns, own, moving is not None, above, *rise))
     return found
 
 

@@ -128,13 +128,15 @@ class SeamBand:
         self._ground = np.where(self.pitch[..., None] > 0, np.float32(usual), difference)
         apart = self._apart(difference)
         self._noise = np.full(self.zone.shape, np.median(apart[on_pitch]) if on_pitch.any() else 0.0, np.float32)
-        is_apart = self._is_apart(apart, MODEL.faint)
-        reach = MODEL.astray * steepness * is_apart[..., None]
+        reach = MODEL.astray * steepness * self._is_apart(apart, MODEL.faint)[..., None]
         self._ground += np.clip(difference - self._ground, -reach, reach)
-        # Noise differs from place to place: a cell is of many pixels of a frame, or of few.
-        calm = (on_pitch & ~is_apart).astype(np.float32)
-        count, total = (cv2.blur(values, 2 * (MODEL.noise_cells,)) for values in (calm, calm * apart))
-        self._noise = np.where(np.asarray(count) > 0.05, total / np.maximum(count, 0.05), self._noise)
+        apart = self._apart(difference)
+        # Noise differs from place to place: a cell is of many pixels of a frame, or of few. The second time nearly all
+        # that is noise counts as such.
+        for _ in range(2):
+            calm = (on_pitch & ~self._is_apart(apart, MODEL.faint)).astype(np.float32)
+            count, total = (cv2.blur(values, 2 * (MODEL.noise_cells,)) for values in (calm, calm * apart))
+            self._noise = np.where(np.asarray(count) > 0.05, total / np.maximum(count, 0.05), self._noise)
 
     def _apart(self, difference: Values) -> Values:
         assert self._ground is not None

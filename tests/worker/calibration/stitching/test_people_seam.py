@@ -136,6 +136,14 @@ def test_who_stands_on_a_line_in_the_first_picture_is_shown_whole(noise):
         assert min(np.abs(found - mask).sum() for mask in masks) < 0.02 * masks[0].sum()
 
 
+def test_noise_that_grows_towards_the_cameras_moves_no_seam_from_the_first_picture_on(noise):
+    seam, growth = band(), np.linspace(0, 3, HEIGHT)[:, None, None]
+    for _ in range(3):
+        values, _ = both([], noise)
+        noisy = [value + (growth * noise.normal(size=(HEIGHT, WIDTH, 1))).astype(np.float32) for value in values]
+        assert is_static(seam, share(seam, noisy))
+
+
 def test_what_stands_beyond_the_field_from_the_first_on_moves_no_seam(noise):
     seam = band(pitch=0)
     values, _ = both([SEAM], noise)
@@ -148,6 +156,13 @@ def test_a_light_that_goes_on_moves_no_seam(noise):
     values, _ = both([], noise)
     for _ in range(3):
         assert is_static(seam, share(seam, [values[0] + 60, values[1]]))
+
+
+@pytest.mark.parametrize(("width", "cell_px"), [(480, 2), (960, 4), (1920, 8)])
+def test_cells_are_no_finer_than_the_pixels_of_frames(width, cell_px):
+    view = chosen_view(PITCH, cameras, ViewChoice(width=width))
+    (found,) = seam_bands(panorama(PITCH, view, cameras), shows_field(PITCH, view), RATE)
+    assert found.cell_px == cell_px
 
 
 def test_bands_lie_where_both_cameras_see():
