@@ -48,7 +48,7 @@ class SeamModel:
     margin: int = 3
     clear: int = 8
     faint: tuple[float, float] = (3.0, 6.0)
-    outright: tuple[float, float] = (6.0, 12.0)
+    outright: tuple[float, float] = (5.5, 12.0)
     speck_cells: int = 2
     astray: float = 0.125
     noise_cells: int = 41
