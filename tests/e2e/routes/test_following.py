@@ -53,7 +53,7 @@ def test_who_follows_a_venue_is_told_of_its_poses_and_of_whatever_happens(servic
     assert service.http.get(f"/venues/{name}/events").status_code == 404
 
 
-@in_both_homes
+@in_one_home_first
 def test_who_was_away_when_a_venue_was_deleted_is_told_so_once(service, name):
     service.venue(name)
     with followed(service, name) as stream:

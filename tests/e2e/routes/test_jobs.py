@@ -9,7 +9,7 @@ import httpx
 import sqlalchemy as sa
 
 from service.store import tables
-from testbed.homes import in_both_homes
+from testbed.homes import in_both_homes, in_one_home_first
 from testbed.running import DEADLINE_S, alive, venue, wait_for
 from tests.e2e.observe.figures import figures
 
@@ -102,7 +102,7 @@ def test_progress_is_shown(service, name):
     service.end(job)
 
 
-@in_both_homes
+@in_one_home_first
 def test_events_tell_the_progress_and_the_end(service, name):
     lines = []
     with ExitStack() as held:
@@ -151,7 +151,7 @@ def test_everybody_who_listens_hears_the_end(service, name):
 # Ending a job early
 
 
-@in_both_homes
+@in_one_home_first
 def test_a_running_job_is_cancelled_within_two_seconds(service, name):
     job = service.submitted(service.venue(name, "hang"))
     service.running(job)

@@ -12,7 +12,7 @@ from service.schemas.problems import Problem
 from service.settings import Settings
 from service.store import blobs
 from service.store.jobs.files import source_file
-from testbed.homes import in_both_homes
+from testbed.homes import in_both_homes, in_one_home_first
 from testbed.running import wait_for
 from testbed.stock import result
 
@@ -82,7 +82,7 @@ def test_a_picture_of_poses_that_show_nothing_is_none(stock, drawing, job):
     assert look(drawing(), stock, job, "seam") == [None]
 
 
-@in_both_homes
+@in_one_home_first
 def test_pictures_are_drawn_of_what_was_kept_when_the_frames_went(stock, drawing, job):
     folder = stock.jobs.pictures(job).folder
     assert stock.blobs.move(stock.jobs.frame(job, 0), source_file(folder, "left"))

@@ -2,7 +2,7 @@
 
 import pytest
 
-from testbed.homes import in_both_homes
+from testbed.homes import in_both_homes, in_one_home_first
 from testbed.running import png, upload, venue
 from tests.e2e.routes.searching import adopt, depth, find, forget_frames, found, refused, site
 
@@ -53,7 +53,7 @@ def test_of_a_camera_that_is_not_sure_a_person_chooses_a_candidate_or_leaves_it_
     assert [one["id"] for one in adopt(service, f"{name}-2", other, right=None).json()["cameras"]] == ["left"]
 
 
-@in_both_homes
+@in_one_home_first
 def test_of_a_stored_venue_those_with_frames_are_found_and_the_others_stay(service, name):
     service.venue(name)
     before = service.http.get(f"/venues/{name}").json()
@@ -69,7 +69,7 @@ def test_of_a_stored_venue_those_with_frames_are_found_and_the_others_stay(servi
     assert back["cameras"] == before["cameras"]
 
 
-@in_both_homes
+@in_one_home_first
 def test_what_was_found_is_calibrated_with_the_frames_of_the_search(service, name):
     job = found(service, name, place=site(name, "partly"))
     assert refused(calibrate(service, job)) == (404, "venue-not-found")

@@ -6,7 +6,7 @@ import pytest
 import sqlalchemy as sa
 
 from service.store import tables
-from testbed.homes import in_both_homes
+from testbed.homes import in_both_homes, in_one_home_first
 from testbed.running import SIZE, png, upload
 
 
@@ -153,7 +153,7 @@ def test_the_frames_that_were_sent_are_the_frames_that_are_kept(service, name):
     assert service.http.get(f"/jobs/{job}/frames/0").content == png(*SIZE, shade=5)
 
 
-@in_both_homes
+@in_one_home_first
 def test_a_job_that_failed_says_what_was_asked_and_shows_its_frames(service, name):
     job = service.calibrated(service.venue(name, "fail"), dry_run=True, generations=7)
     assert (job["status"], job["error"]["camera"], job["asked_by"]) == ("failed", "left", None)
@@ -170,7 +170,7 @@ def test_a_job_that_failed_says_what_was_asked_and_shows_its_frames(service, nam
     assert (missing.status_code, missing.json()["type"]) == (404, "/problems/picture-not-found")
 
 
-@in_both_homes
+@in_one_home_first
 def test_a_job_whose_frames_are_past_their_time_names_none(service, name):
     job = service.calibrated(service.venue(name))
     (address,) = job["frames"]["left"]

@@ -6,7 +6,7 @@ import pytest
 from service.schemas.field import FieldOfPlay
 from service.schemas.results import AdoptableNumber
 from service.store.memories import newest_memories
-from testbed.homes import in_both_homes
+from testbed.homes import in_one_home_first
 from testbed.stock import result
 from tests.problems import refused
 from tests.service.store.test_refined import refined
@@ -46,7 +46,7 @@ def length(stock):
     return stock.venues.get("v").field.length_m
 
 
-@in_both_homes
+@in_one_home_first
 def test_a_ridge_is_stored_as_a_revision_of_its_own_and_moves_no_camera(stock):
     stock.venue("v")
     job = night(stock, RIDGE)
@@ -99,7 +99,7 @@ def test_a_ridge_and_a_length_of_one_job_are_stored_one_after_the_other_in_any_o
     assert adopted(stock, job) == both
 
 
-@in_both_homes
+@in_one_home_first
 def test_restoring_the_revision_before_takes_a_length_back_and_the_one_after_brings_it_again(stock):
     stock.venue("v")
     job = night(stock, LENGTH)

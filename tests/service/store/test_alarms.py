@@ -3,7 +3,7 @@
 from service.schemas.health import Alarms as Rules
 from service.schemas.job import JobError
 from service.store.statistics.snapshot import read_statistics
-from testbed.homes import in_both_homes
+from testbed.homes import in_both_homes, in_one_home_first
 from worker.duties.alarms import AlarmTimer
 
 URL = "https://example.com/alarms"
@@ -96,7 +96,7 @@ def test_an_alarm_names_the_setting_that_it_goes_by(stock):
     assert stock.alarms_told()[0].data.setting == "rejected_in_a_row"
 
 
-@in_both_homes
+@in_one_home_first
 def test_alarms_go_with_their_venue(stock):
     watched(stock, rejected_in_a_row=1)
     stock.calibrated("v", accepted=False)

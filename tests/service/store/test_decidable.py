@@ -1,14 +1,14 @@
 """What can still be decided about a calibration is what is then not refused."""
 
 from service.store.jobs.decisions import OpenDecisions
-from testbed.homes import in_both_homes
+from testbed.homes import in_one_home_first
 from tests.problems import refused
 
 BOTH = frozenset({"left", "right"})
 NOTHING = OpenDecisions(frozenset(), reject=False)
 
 
-@in_both_homes
+@in_one_home_first
 def test_poses_that_hold_can_be_rejected_and_then_accepted(stock):
     stock.venue("v")
     job = stock.calibrated("v")

@@ -8,7 +8,7 @@ from service.schemas.field import FieldOfPlay
 from service.schemas.geometry import Intrinsics
 from service.store import tables
 from service.store.memories import KEPT, LARGEST_BYTES, newest_memories
-from testbed.homes import in_both_homes
+from testbed.homes import in_both_homes, in_one_home_first
 from testbed.stock import result
 
 pytestmark = pytest.mark.slow
@@ -72,7 +72,7 @@ def test_another_name_or_a_better_known_lens_changes_no_memory(stock):
     assert remembered(stock) == {"left": 1, "right": 1}
 
 
-@in_both_homes
+@in_one_home_first
 def test_on_another_field_all_cameras_begin_anew_and_no_undoing_brings_the_nights_back(stock):
     stock.venue("v")
     night(stock, 1)
@@ -140,7 +140,7 @@ def test_a_deleted_venue_leaves_no_memories(stock):
     assert rows(stock) == 0
 
 
-@in_both_homes
+@in_one_home_first
 def test_memories_expire_with_the_revision_that_they_came_with(stock):
     stock.venue("v")
     for number in range(1, 4):

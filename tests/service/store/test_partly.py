@@ -5,7 +5,7 @@ import pytest
 from service.schemas.geometry import Light
 from service.schemas.results import View
 from service.store.statistics.snapshot import read_statistics
-from testbed.homes import in_both_homes
+from testbed.homes import in_both_homes, in_one_home_first
 from testbed.stock import result
 from tests.service.store.test_alarms import failed, rings, told, watched
 
@@ -27,7 +27,7 @@ BEFORE, LEFT_MOVED, BOTH_MOVED = (
 )
 
 
-@in_both_homes
+@in_one_home_first
 def test_only_the_poses_that_are_accepted_are_stored(stock):
     stock.venue("v")
     assert standing(stock) == BEFORE

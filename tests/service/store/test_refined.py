@@ -7,7 +7,7 @@ from service.schemas.geometry import Intrinsics, Pose
 from service.schemas.results import Refined
 from service.store import tables
 from service.store.memories import newest_memories
-from testbed.homes import in_both_homes
+from testbed.homes import in_both_homes, in_one_home_first
 from testbed.stock import result
 from tests.problems import refused
 
@@ -76,7 +76,7 @@ def test_a_refused_pose_that_is_accepted_by_hand_has_none(stock):
     assert along(stock) == {"right": -0.999}
 
 
-@in_both_homes
+@in_one_home_first
 def test_to_store_one_is_a_revision_that_keeps_the_memories_and_what_is_known_of_the_lens(stock):
     stock.venue("v")
     job = night(stock)

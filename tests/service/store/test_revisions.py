@@ -4,7 +4,7 @@ import pytest
 
 from service.schemas.field import FieldOfPlay
 from service.schemas.geometry import Intrinsics
-from testbed.homes import in_both_homes
+from testbed.homes import in_both_homes, in_one_home_first
 from testbed.stock import result
 from tests.problems import refused
 
@@ -91,7 +91,7 @@ def test_a_lens_that_is_known_better_meanwhile_stops_no_result(stock):
     assert standing(stock) == -0.999
 
 
-@in_both_homes
+@in_one_home_first
 def test_drift_is_counted_from_where_each_camera_was_put(stock):
     stock.venue("v")
     for _ in range(3):
@@ -107,7 +107,7 @@ def test_drift_is_counted_from_where_each_camera_was_put(stock):
     assert (right.drift_since, right.drift.position_m) == (1, pytest.approx(0.004))
 
 
-@in_both_homes
+@in_one_home_first
 def test_an_older_revision_holds_again_with_its_lenses_and_its_ridge(stock):
     stock.venue("v")
     longer = Intrinsics(matrix=[[61, 0, 32], [0, 61, 24], [0, 0, 1]], distortion=[])
@@ -167,7 +167,7 @@ def test_a_result_that_did_not_move_the_venue_can_be_taken_by_hand(stock, how):
     assert told(stock) == [(2, "accepted", job, None), (1, "put", None, None)]
 
 
-@in_both_homes
+@in_one_home_first
 def test_what_was_taken_can_be_given_back_and_taken_again(stock):
     stock.venue("v")
     job = stock.calibrated("v")

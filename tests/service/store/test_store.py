@@ -23,7 +23,7 @@ from service.store.ids import new_id
 from service.store.preconditions import Precondition
 from service.store.venues import VenueRepository
 from service.store.workers import WorkerRepository
-from testbed.homes import in_both_homes, on_servers
+from testbed.homes import in_both_homes, in_one_home_first, on_servers
 from testbed.stock import result
 from tests.problems import refused
 
@@ -188,7 +188,7 @@ def test_a_bucket_that_takes_a_request_and_says_nothing_is_not_waited_for_any_lo
         assert gives_up_in_time(monkeypatch, "http://{}:{}".format(*silent.getsockname()))
 
 
-@in_both_homes
+@in_one_home_first
 def test_a_job_is_handed_out_with_what_the_frames_of_the_last_accepted_one_were_like(stock):
     def after(task, view, *, accepted):
         """The next job, when this one has ended with such a view of all cameras."""

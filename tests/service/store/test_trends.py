@@ -7,7 +7,7 @@ import sqlalchemy as sa
 
 from service.schemas.health import Alarms
 from service.store import tables, venue_fold
-from testbed.homes import in_both_homes
+from testbed.homes import in_both_homes, in_one_home_first
 from tests.trending import SIGMA_M, displacement, night, nights, noisy
 
 pytestmark = pytest.mark.slow
@@ -35,7 +35,7 @@ def test_a_venue_that_was_never_calibrated_has_an_empty_trend(stock):
     assert found.words == "Camera left has had no pose accepted since it was put."
 
 
-@in_both_homes
+@in_one_home_first
 def test_the_first_accepted_pose_is_the_anchor_and_later_ones_are_counted_from_it(stock):
     nights(stock, 3, AUTUMN, lambda number: displacement(0.01 * (number + 1)))
     # The first was compared with nothing.
@@ -178,7 +178,7 @@ def test_a_focal_length_that_creeps_is_named_with_what_it_moves(stock):
     assert "moved" not in found.words
 
 
-@in_both_homes
+@in_one_home_first
 def test_many_jobs_of_one_day_are_one_night(stock):
     def every_six_hours(number):
         return displacement(0.0 if number == 0 else 0.01 * (number % 2))

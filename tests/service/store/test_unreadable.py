@@ -133,7 +133,7 @@ def test_a_put_of_it_goes_by_its_conditions_and_knows_its_passwords(stock, servi
     assert stock.venues.with_credentials("broken") == (anew, {"left": "user:secret"})
 
 
-@in_both_homes
+@in_one_home_first
 def test_its_alarms_hold_up_no_other_venue(stock, service, broken):
     stock.time_passes(hours=3)
     timer = AlarmTimer(stock.venues)
@@ -144,7 +144,7 @@ def test_its_alarms_hold_up_no_other_venue(stock, service, broken):
     assert {alarm.camera for alarm in stock.venues.health("broken").alarms} == {None}
 
 
-@in_both_homes
+@in_one_home_first
 def test_a_job_of_it_ends_and_is_rejected_back(stock, service):
     job = stock.calibrated("v")
     running = stock.attempts.begin(stock.submitted("v"))

@@ -12,7 +12,7 @@ from service.store.blobs import BlobFolderUnavailable
 from service.store.jobs.files import source_file
 from service.store.jobs.queries import JobPage
 from service.store.statistics import counters
-from testbed.homes import in_both_homes
+from testbed.homes import in_both_homes, in_one_home_first
 from testbed.stock import Stock
 from worker.duties.retention import AT_ONCE, FOLDERS_OF_A_JOB, TRY_AGAIN_AFTER, Retention
 
@@ -45,7 +45,7 @@ def test_frames_go_after_two_days_and_pictures_after_two_weeks(stock, retention)
     assert {job.id for job in stock.jobs.page(JobPage(10, venue="a")).jobs} == {failed, old, older, young}
 
 
-@in_both_homes
+@in_one_home_first
 def test_frames_of_pictures_that_nobody_has_looked_at_stay_as_long_as_pictures(stock, retention):
     unseen, old = (stock.ended("a", ago(days=days), accepted=False, drawn=False) for days in (3, 15))
     retention.round(NOW)

@@ -14,7 +14,7 @@ from service.schemas.health import Alarms
 from service.store import tables
 from service.store.events.outbox import AT_ONCE_PER_RECEIVER
 from service.store.jobs.queries import JobPage
-from testbed.homes import in_both_homes
+from testbed.homes import in_both_homes, in_one_home_first
 from testbed.stock import Stock
 from tests.worker.receiver import Holding, Receiver, Talkative, resolve_to
 from worker.duties import webhook_request
@@ -73,7 +73,7 @@ def ended(stock, url: str, **more) -> str:
     return stock.ended("v", datetime.now(UTC), callback_url=url, **more)
 
 
-@in_both_homes
+@in_one_home_first
 def test_the_end_of_a_job_is_told_with_the_job(stock, receiver, clock):
     home, hook = stock(), receiver()
     job = ended(home, hook.url)
@@ -170,7 +170,7 @@ def test_a_cancelled_job_is_told_of_once(stock):
 # Again and again
 
 
-@in_both_homes
+@in_one_home_first
 def test_what_fails_is_sent_again_after_ever_longer_pauses_with_the_same_id(stock, receiver, clock):
     home, hook = stock(), receiver(Receiver, 500, 302, 404, 200)
     job = ended(home, hook.url)
@@ -186,7 +186,7 @@ def test_what_fails_is_sent_again_after_ever_longer_pauses_with_the_same_id(stoc
     assert home.callbacks() == {"delivered": 1}
 
 
-@in_both_homes
+@in_one_home_first
 def test_the_job_says_how_far_the_telling_has_come(stock, receiver, clock):
     home, hook = stock(), receiver(Talkative, 500, 200)
     waiting = home.submitted("a", callback_url=hook.url)
@@ -209,7 +209,7 @@ def test_the_job_says_how_far_the_telling_has_come(stock, receiver, clock):
     assert [job.callback for job in home.jobs.page(JobPage(10)).jobs] == [told]
 
 
-@in_both_homes
+@in_one_home_first
 def test_a_receiver_that_is_gone_is_left_alone_and_the_job_says_why(stock, receiver, clock):
     home, hook = stock(), receiver(Receiver, 410)
     job = ended(home, hook.url)
