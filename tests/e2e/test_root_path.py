@@ -1,5 +1,6 @@
 """A service below a path of another site, behind a proxy that leaves the path on requests and one that takes it off."""
 
+import re
 import shutil
 
 import pytest
@@ -11,6 +12,8 @@ from tests.e2e.proxies import NAME, Caddy, Nginx
 from tests.e2e.routes.event_stream import Stream
 
 ROOT = "/truck/esc"
+# Addresses of ours in a page: none may begin at the root of the host.
+BESIDE = re.compile(rf'="/(?!{ROOT[1:]}[/"])')
 
 
 @pytest.fixture(scope="module")
@@ -61,6 +64,18 @@ def test_an_address_with_one_slash_too_many_leads_below_the_path_of_the_same_hos
 def test_a_host_that_is_none_is_no_mistake_of_the_service(below, host):
     for path in ("/venues/", "/nothing", "/ui/jobs"):
         assert below[0].http.get(f"{ROOT}{path}", headers={"Host": host}, follow_redirects=False).status_code < 500
+
+
+def test_every_address_of_every_page_is_below_the_path(http, name):
+    files = [(camera, (f"{camera}.png", png())) for camera in ("left", "right")]
+    job = http.post(f"/venues/{name}/calibrate", files=files).json()["id"]
+    http.get(f"/jobs/{job}", params={"wait": 60})
+    of_venue = ("", "/settings", "/ignore", "/calibrate", "/find", "/first-pose")
+    others = ("/", "/docs", "/ui/jobs", f"/ui/jobs/{job}", "/ui/new-venue", "/ui/new-venue/by-hand")
+    for address in (*others, "/refusals/residual", *(f"/ui/venues/{name}{page}" for page in of_venue)):
+        page = http.get(address, headers={"Accept": "text/html"})
+        assert page.status_code == 200, address
+        assert BESIDE.findall(page.text) == [], address
 
 
 def test_the_next_page_of_a_list_is_below_the_path(http, name):

@@ -31,12 +31,12 @@ def browser(missing):
 
 @pytest.fixture(scope="package")
 def stub(tmp_path_factory):
-    """A service whose engine does what the names of the venues say.
+    """A service whose engine does what the names of the venues say, and which may fetch frames from this machine.
 
     Fixtures that put something into it live as long as it does: tests are shared out as processes become free, so that
     a module may begin twice on one service.
     """
-    running = Service(tmp_path_factory.mktemp("stub"))
+    running = Service(tmp_path_factory.mktemp("stub"), ESC_SOURCES='["127.0.0.0/8"]')
     wait_for(lambda: ready(running.http), STARTING_S)
     yield running
     assert running.stop() == 0

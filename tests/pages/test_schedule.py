@@ -6,18 +6,9 @@ import pytest
 from playwright.sync_api import expect
 
 from testbed.network_cameras import NetworkCamera
-from testbed.running import Service
-from tests.pages.browsing import grave, press_and_confirm
+from tests.pages.browsing import press_and_confirm
 
 ZONE = "Asia/Tokyo"
-
-
-@pytest.fixture(scope="module")
-def fetching(tmp_path_factory):
-    """A service that may fetch frames from cameras on this machine."""
-    running = Service(tmp_path_factory.mktemp("fetching"), ESC_SOURCES='["127.0.0.0/8"]').ready()
-    yield running
-    running.kill()
 
 
 @pytest.fixture(scope="module")
@@ -25,8 +16,8 @@ def camera():
     return NetworkCamera()
 
 
-def test_a_schedule_is_made_tried_and_ended(fetching, camera, visit):
-    page = visit(fetching.url, f"/ui/venues/{fetching.venue('timed')}", zone=ZONE)
+def test_a_schedule_is_made_tried_and_ended(stub, camera, visit):
+    page = visit(stub.url, f"/ui/venues/{stub.venue('timed')}", zone=ZONE)
     expect(page.get_by_role("button", name="Try it now")).to_have_count(0)
     expect(page.get_by_label("Time zone")).to_have_value(ZONE)
     page.get_by_label("Cron schedule").fill("0 3 * * *")
@@ -43,17 +34,16 @@ def test_a_schedule_is_made_tried_and_ended(fetching, camera, visit):
     page.wait_for_url("**/ui/jobs/*")
     expect(page.get_by_text("Accepted")).to_be_visible()
     page.goto("/ui/venues/timed")
-    assert grave(page) == []
     page.get_by_label("Start exactly on time").check()
     page.get_by_role("button", name="Save schedule").click()
     expect(schedule.get_by_role("definition").nth(1)).to_have_text(re.compile("03:00:00"))
     press_and_confirm(page.get_by_role("button", name="End schedule"))
     expect(page.get_by_role("button", name="End schedule")).to_have_count(0)
-    assert fetching.http.get("/venues/timed").json()["schedule"] is None
+    assert stub.http.get("/venues/timed").json()["schedule"] is None
 
 
-def test_what_is_wrong_with_a_schedule_is_said_beside_it(fetching, camera, visit):
-    page = visit(fetching.url, f"/ui/venues/{fetching.venue('wrong')}", forgiven=("422",))
+def test_what_is_wrong_with_a_schedule_is_said_beside_it(stub, camera, visit):
+    page = visit(stub.url, f"/ui/venues/{stub.venue('wrong')}", forgiven=("422",))
     refused = page.locator("#schedule-refused")
     page.get_by_role("button", name="Save schedule").click()
     expect(refused).to_contain_text("a schedule needs a source of every camera, and left, right have none")
@@ -64,9 +54,9 @@ def test_what_is_wrong_with_a_schedule_is_said_beside_it(fetching, camera, visit
     expect(refused).to_contain_text("'99 * * * *' is no schedule")
 
 
-def test_times_are_those_of_the_clock_where_the_viewer_is(fetching, visit):
-    job = fetching.calibrated(fetching.venue("clock"))
-    page = visit(fetching.url, f"/ui/jobs/{job['id']}", zone=ZONE)
+def test_times_are_those_of_the_clock_where_the_viewer_is(stub, visit):
+    job = stub.calibrated(stub.venue("clock"))
+    page = visit(stub.url, f"/ui/jobs/{job['id']}", zone=ZONE)
     told = page.locator("time[data-at]").first
     expect(told).to_have_text(re.compile(r"GMT\+9$"))
     utc = job["created_at"][:16].replace("T", " ")

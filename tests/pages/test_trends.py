@@ -38,10 +38,10 @@ SUMMER = datetime(2026, 6, 1, 2, tzinfo=UTC)
 
 @pytest.fixture(scope="package")
 def drifted(stub):
-    """A venue whose cameras were quiet for thirty nights and have drifted for thirty more."""
+    """A venue whose cameras were quiet for twenty nights and have drifted for ten more."""
     stock = Stock(stub.data)
-    first = datetime.now(UTC) - timedelta(days=60)
-    nights(stock, 60, first, noisy(5, lambda number: 0.003 * max(0, number - 30)))
+    first = datetime.now(UTC) - timedelta(days=30)
+    nights(stock, 30, first, noisy(5, lambda number: 0.012 * max(0, number - 20)))
     stock.engine.dispose()
     return "/ui/venues/v"
 
