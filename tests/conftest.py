@@ -25,8 +25,8 @@ from testbed.homes import Embedded, Servers, postgres_binaries, postgres_server,
 from testbed.shared_caches import share_caches
 from testbed.stock import Stock
 
-# How long an example takes says how busy the machine is, not whether the property holds.
-hypothesis.settings.register_profile("esc", deadline=None)
+# How long an example takes says how busy the machine is, not whether the property holds. Each run draws other examples.
+hypothesis.settings.register_profile("esc", deadline=None, max_examples=30)
 hypothesis.settings.load_profile("esc")
 
 share_caches()
@@ -140,9 +140,12 @@ def dealt(items, processes):
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers(config):
-    """Of `auto` twice as many as there are cores: tests of the whole service wait longer than they compute."""
+    """Of `auto` half as many again as there are cores: tests of the whole service wait longer than they compute.
+
+    Each further process imports all tests, services and a browser, and paints all pictures, for itself.
+    """
     cores = len(os.sched_getaffinity(0))
-    return 2 * cores if config.option.numprocesses == "auto" else cores
+    return cores + cores // 2 if config.option.numprocesses == "auto" else cores
 
 
 @pytest.fixture(scope="session")

@@ -51,7 +51,7 @@ def numbered(cameras):
 
 
 def test_maps_take_the_place_of_the_stitcher_of_opencv(tmp_path):
-    cameras = pair()
+    cameras = [one.resized(480) for one in pair()]
     asked = StitchRequest(
         field=FieldOfPlay(length_m=PITCH.length, width_m=PITCH.width),
         cameras=[shot.camera.model_dump(include=ON_THE_WIRE) for shot in numbered(cameras)],

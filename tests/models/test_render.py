@@ -136,7 +136,7 @@ def test_nothing_outside_the_pitch_is_a_marking():
             {"snow": 1.0},
             {"noise": 1.0, "blur": 1.0, "sharpening": 1.0, "fringe": 1.0, "jpeg_quality": 40},
         ],
-        2,
+        1,
     ),
     ids=lambda change: "-".join(map(str, change)),
 )

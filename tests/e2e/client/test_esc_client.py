@@ -205,6 +205,7 @@ def test_the_wheel_has_the_client_and_nothing_that_it_does_not_reach(wheel):
     assert imported - sys.stdlib_module_names == {"esc_client", "httpx", "pydantic", "croniter", "numpy"}
 
 
+@pytest.mark.long
 def test_every_module_is_imported_where_nothing_else_of_esc_is_and_its_version_is_that_of_the_service(wheel, program):
     version = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
     assert wheel.name == f"esc_client-{version}-py3-none-any.whl"

@@ -67,7 +67,7 @@ def test_a_package_holds_until_a_pose_or_the_view_changes(service, name):
 
 def test_the_view_is_the_venues_unless_a_request_has_it_otherwise(service, name):
     service.venue(name)
-    view = {"projection": "birds-eye", "width_px": 640, "height_px": 480}
+    view = {"projection": "birds-eye", "width_px": 320, "height_px": 240}
     type_ = {"Content-Type": "application/merge-patch+json"}
     kept = service.http.patch(f"/venues/{name}", json={"view": view}, headers=type_)
     assert kept.json()["view"] == {"field_of_view_deg": None, "pan_deg": 0.0, "horizon": None} | view
@@ -77,9 +77,9 @@ def test_the_view_is_the_venues_unless_a_request_has_it_otherwise(service, name)
         answer = service.http.get(f"/venues/{name}/stitch", params=params)
         return json.loads(files_of(answer)["view.json"])["size_px"]
 
-    assert size() == [640, 480]
-    assert size(width_px=322) == [322, 480]
-    assert size(height_px="auto") == [640, 426]
+    assert size() == [320, 240]
+    assert size(width_px=322) == [322, 240]
+    assert size(height_px="auto") == [320, 214]
 
 
 @pytest.mark.parametrize(
@@ -114,7 +114,7 @@ def test_a_preview_shows_the_frames_of_the_last_calibration(service, name):
     assert abs(np.median(picture) - 200) <= 2
     assert preview(service, name, shown.headers["etag"]).status_code == 304
     assert preview(service, name, shown.headers["etag"], seam=True).status_code == 200
-    large = preview(service, name, width_px=3840, height_px=1080)
+    large = preview(service, name, width_px=1920, height_px=540)
     assert cv2.imdecode(np.frombuffer(large.content, np.uint8), cv2.IMREAD_COLOR).shape == (360, 1280, 3)
 
 

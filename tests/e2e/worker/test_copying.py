@@ -124,6 +124,7 @@ def test_numbers_of_events_are_not_given_again_in_the_copy(servers, esc, tmp_pat
     engine.dispose()
 
 
+@pytest.mark.long
 def test_a_service_on_the_copy_answers_as_the_one_before_and_goes_on(servers, start, esc, tmp_path):
     folder = tmp_path / "esc"
     folder.mkdir()

@@ -122,6 +122,7 @@ def test_a_second_worker_of_one_name_on_one_machine_is_told_so_and_ends(service,
     assert service.worker() == worker
 
 
+@pytest.mark.long
 def test_a_service_whose_worker_has_the_name_of_another_machines_ends(start, worker_beside, tmp_path):
     service = start("serve", ESC_WORKER_NAME="truck")
     worker_beside(service, "truck", "one")

@@ -39,11 +39,6 @@ def records():
     return [record(one) for one in rendered_pair.cameras()]
 
 
-def take_frame(folder, camera, pitch=rendered_pair.PITCH):
-    frame = render_frame(pitch, camera, Conditions.fair(22), np.random.default_rng(0)).frame
-    (folder / f"{camera.id}.jpg").write_bytes(rendered_pair.encoded(frame))
-
-
 @pytest.fixture(scope="module")
 def frames(tmp_path_factory):
     folder = tmp_path_factory.mktemp("frames")
@@ -81,7 +76,8 @@ def test_a_crown_that_nobody_said_is_no_motion_of_the_cameras(tmp_path, capsys, 
     (tmp_path / "site.json").write_text('{"id": "pair", "field": {"template": "football", "line_width_m": 0.12}}')
     crowned = rendered_pair.PITCH.flat().raised(0.6)
     for one in rendered_pair.cameras():
-        take_frame(tmp_path, one, crowned)
+        frame = render_frame(crowned, one, Conditions.fair(22), np.random.default_rng(0)).frame
+        (tmp_path / f"{one.id}.jpg").write_bytes(rendered_pair.encoded(frame))
     cameras = [
         replace(
             one,
@@ -98,15 +94,12 @@ def test_a_crown_that_nobody_said_is_no_motion_of_the_cameras(tmp_path, capsys, 
         assert "ridge 0." in answer["warnings"][0]
 
 
-def test_centimetres_and_a_turn_are_told_and_corrected(tmp_path, capsys):
-    camera = rendered_pair.cameras()[0]
-    take_frame(tmp_path, camera)
-    (tmp_path / "site.json").write_text(SITE)
-    true = record(camera)
+def test_centimetres_and_a_turn_are_told_and_corrected(tmp_path, frames, capsys):
+    true = records()[0]
     turned = [true.pose.rotation[0] + math.radians(0.6), *true.pose.rotation[1:]]
     given = replace(true, pose=Pose.from_position(turned, [100 * metres for metres in true.pose.position]))
     output = tmp_path / "corrected.toml"
-    code, answer, _ = run(tmp_path, tmp_path, [given], "pose2sim", capsys, output=output)
+    code, answer, _ = run(tmp_path, frames, [given], "pose2sim", capsys, output=output)
     assert (code, answer["grade"]) == (3, "wrong")
     (checked,) = answer["cameras"]
     assert [cause["cause"] for cause in checked["causes"]] == ["centimetres", "turned"]
@@ -116,10 +109,15 @@ def test_centimetres_and_a_turn_are_told_and_corrected(tmp_path, capsys):
 
 
 def test_coefficients_in_another_order_are_told_and_not_taken_for_a_turn(tmp_path, capsys):
-    camera = rendered_pair.cameras()[0]
-    k1, k2, p1, p2, k3 = bent = [-0.3, 0.1, 0.002, -0.001, -0.006]
-    camera = replace(camera, intrinsics=replace(camera.intrinsics, distortion=np.array(bent)))
-    take_frame(tmp_path, camera)
+    taken_by = rendered_pair.cameras()[0]
+    k1, k2, p1, p2, k3 = bent = [-0.302, 0.1, 0.002, -0.001, -0.006]
+    camera = taken_by.with_lens(replace(taken_by.intrinsics, distortion=np.array(bent)))
+    # What that lens would have shown.
+    pixels = np.stack(np.meshgrid(*map(np.arange, rendered_pair.SIZE)), axis=-1).astype(float)
+    there = taken_by.project(camera.pose.position + camera.rays(pixels)).astype(np.float32)
+    taken = rendered_pair.picture("left")
+    frame = cv2.remap(taken, there, None, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
+    (tmp_path / "left.jpg").write_bytes(rendered_pair.encoded(frame))
     (tmp_path / "site.json").write_text(SITE)
     true = record(camera)
     written = true.intrinsics.model_copy(update={"distortion": [k1, k2, k3, p1, p2]})

@@ -25,7 +25,7 @@ from worker.calibration.tracking.follower import CameraTracker
 
 pytestmark = pytest.mark.slow
 
-SIZE = (1920, 600)
+SIZE = (1280, 400)
 
 
 def panorama(name="pan", model=Cylindrical, x=0.5, tilt_deg=12.0, view_deg=180.0):
@@ -103,5 +103,5 @@ def test_a_panorama_that_sways_is_tracked():
         now = tracker.see({"pan": Channels([frame])}).cameras[0]
         assert now.how == "measured"
     there = derivatives.moved(truth, np.append(turn, np.zeros(3))).project(ends)
-    assert np.linalg.norm(there - truth.project(ends), axis=1).min() > 3
+    assert np.linalg.norm(there - truth.project(ends), axis=1).min() > 2
     assert np.linalg.norm(there - now.camera.project(ends), axis=1).max() < 0.3

@@ -217,16 +217,22 @@ MASKS = {"mask_left", "mask_right"}
 
 
 @pytest.mark.usefixtures("drawn")
-def test_the_outcome_is_what_was_found_with_pictures_and_provenance(venue, files, asked, means):
+def test_the_outcome_is_what_was_found_with_provenance_and_pictures_that_are_accepted_wait_for_who_looks(
+    venue, files, asked, means
+):
     steps = []
-    outcome = solve(venue, files, Options(seed=7, pictures=True), means, steps.append)
+    outcome = solve(venue, files, Options(seed=7), means, lambda _: None)
     result = outcome.result
     assert result.accepted
     assert result.cameras[0].pose.position == [-0.95, -49, 8]
     assert (result.provenance.seed, result.provenance.model_sha256) == (7, "f" * 64)
-    assert set(result.timings_s) == set(result.cpu_s) == {"decode", "evolution", "preview"}
-    assert [step.stage for step in steps] == ["evolution", "preview"]
     assert [camera.seen_by_network for camera in result.cameras] == ["overview", "full"]
+    # All but what the network saw.
+    assert (set(outcome.pictures), set(outcome.later)) == (MASKS, ALL_PICTURES)
+    asked["against"] = {"right": "it is dark"}
+    outcome = solve(venue, files, Options(seed=7), means, steps.append)
+    assert set(outcome.result.timings_s) == set(outcome.result.cpu_s) == {"decode", "evolution", "preview"}
+    assert [step.stage for step in steps] == ["evolution", "preview"]
     assert (set(outcome.pictures), outcome.later) == (ALL_PICTURES | MASKS, ())
     begins = {".jpg": b"\xff\xd8", ".png": b"\x89PNG"}
     assert all(file.startswith(begins[picture_file(name)[-4:]]) for name, file in outcome.pictures.items())
@@ -238,17 +244,6 @@ def test_only_the_pictures_are_drawn_that_are_named(venue, files, means):
     for names in (["preview", "overlay_left"], ["preview_before"], ["seam"]):
         outcome = solve(venue, files, Options(seed=7), means, lambda _: None, pictures=names)
         assert set(outcome.pictures) - MASKS == {*names}
-
-
-@pytest.mark.usefixtures("drawn")
-def test_pictures_of_poses_that_are_accepted_wait_for_who_looks_but_for_what_the_network_saw(
-    venue, files, asked, means
-):
-    outcome = solve(venue, files, Options(seed=7), means, lambda _: None)
-    assert (set(outcome.pictures), set(outcome.later)) == (MASKS, ALL_PICTURES)
-    asked["against"] = {"right": "it is dark"}
-    outcome = solve(venue, files, Options(seed=7), means, lambda _: None)
-    assert (set(outcome.pictures), outcome.later) == (ALL_PICTURES | MASKS, ())
 
 
 def drawn_by_a_process(given, frames):
@@ -278,7 +273,7 @@ def test_a_picture_drawn_later_is_the_one_that_the_job_draws(venue, files, asked
     outcome = solve(venue, files, at_once, means, lambda _: None)
     first = {camera: several[0] for camera, several in files.items()}
     drawn_later = drawn_by_a_process if options == Options() else drawn_here
-    for name in ("preview", "birdseye", "frame_left", "frame_right"):
+    for name in ("preview", "birdseye", "frame_left"):
         needed = {camera: file for camera, file in first.items() if not name.startswith("frame") or camera in name}
         given = DrawingRequest.of(venue, outcome.result, drawn_together(name), 1)
         drawn = drawn_later(given, needed)

@@ -7,6 +7,7 @@ import pytest
 from service.schemas.options import Options
 from service.schemas.venue import VenueIn
 from service.settings import MODEL_BESIDE_THE_CODE
+from testbed import rendered_pair
 from testbed.by_models import solve
 from tests.architecture import ROOT
 from worker.calibration.records import NOT_RECORDED
@@ -15,27 +16,12 @@ from worker.jobs.debugging import DebugRecorder
 
 pytestmark = pytest.mark.slow
 
-DEMO = ROOT / "demo"
-SHRUNK = 4
 OF_CAMERA = ("view.json", "response.png", "lines.json", "lines.jpg", "residuals.jpg", "ground.jpg")
 
 
-def smaller_demo():
-    """The demo at a quarter of its size: files by camera, and the venue with lenses of that size."""
-    venue = json.loads((DEMO / "venue.json").read_text())
-    files = {}
-    for camera in venue["cameras"]:
-        lens = camera["intrinsics"]
-        lens["matrix"] = (np.diag([1 / SHRUNK, 1 / SHRUNK, 1]) @ np.array(lens["matrix"])).tolist()
-        camera["image_size"] = [side // SHRUNK for side in camera["image_size"]]
-        frame = cv2.imread(str(DEMO / f"{camera['id']}.jpg"))
-        small = cv2.resize(frame, tuple(camera["image_size"]), interpolation=cv2.INTER_AREA)
-        files[camera["id"]] = [cv2.imencode(".png", small)[1].tobytes()]
-    return VenueIn.model_validate(venue).to_venue(), files
-
-
 def solved(recorder=NOT_RECORDED):
-    venue, files = smaller_demo()
+    venue = VenueIn.model_validate(rendered_pair.venue("v")).to_venue()
+    files = {camera: [frame] for camera, frame in rendered_pair.frames().items()}
     resources, options = (
         ComputeResources(model=MODEL_BESIDE_THE_CODE, threads=1),
         Options(seed=1, search="wide", generations=20),
@@ -79,7 +65,7 @@ def test_lines_lie_on_the_paint_and_their_residuals_shrink(recorded, camera):
     lines = json.loads(recorded[1][f"{camera}.lines.json"])
     assert lines["rms_px"] < 0.2 * lines["rms_before_px"]
     response = cv2.imdecode(np.frombuffer(recorded[1][f"{camera}.response.png"], np.uint8), cv2.IMREAD_GRAYSCALE)
-    frame = cv2.imdecode(np.frombuffer(smaller_demo()[1][camera][0], np.uint8), cv2.IMREAD_GRAYSCALE)
+    frame = cv2.imdecode(np.frombuffer(rendered_pair.frames()[camera], np.uint8), cv2.IMREAD_GRAYSCALE)
     scale = response.shape[1] / frame.shape[1]
     column, row = np.rint((np.array(lines["pixel"]) + 0.5) * scale - 0.5).astype(int).T
     sure = np.array(lines["weight"]) > 0.5

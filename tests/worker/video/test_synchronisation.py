@@ -58,6 +58,7 @@ def test_lamps_that_flicker_are_not_taken_for_motion(left, tmp_path):
     assert estimate_offset(left, motion("right", path)).second_s == pytest.approx(0.2, abs=0.01)
 
 
+@pytest.mark.long
 def test_an_empty_pitch_tells_nothing(left, tmp_path):
     still = motion("right", film(tmp_path / "r.mp4", RIGHT, 4.0, moving=False))
     found = estimate_offset(left, still)

@@ -82,6 +82,7 @@ def test_how_far_a_camera_turned_in_each_frame_is_found_to_a_twentieth_of_a_pixe
         assert np.abs(sway.shift - expected).max() < 0.05
 
 
+@pytest.mark.long
 def test_lines_thinner_than_the_shaking_stay_as_they_are_in_one_frame():
     still = [Sway(None)] * len(frames())
     as_in_one = np.mean([far_line(brightness(frames()[:1], [])), far_line(of_mean_turn()[..., Channel.GREEN])])

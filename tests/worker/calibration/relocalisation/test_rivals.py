@@ -17,8 +17,9 @@ from worker.calibration.relocalisation.rivals import tell_rivals_apart
 from worker.calibration.relocalisation.shared_ground import SharedGround
 from worker.calibration.relocalisation.sought import ANYWHERE, Place, SoughtCamera, SoughtLens
 
-LEFT, RIGHT = pair()
-FAR_RIGHT = camera("far right", (8.0, -48.0, 10.0), (55.0, -12.0))
+# Small frames show ground as well.
+LEFT, RIGHT = (one.resized(480) for one in pair())
+FAR_RIGHT = camera("far right", (8.0, -48.0, 10.0), (55.0, -12.0)).resized(480)
 CAMERAS = (LEFT, RIGHT, FAR_RIGHT)
 NOT_UNIQUE = NotFound("not-unique", "two poses explain the lines")
 

@@ -9,9 +9,10 @@ from testbed.synthetic import PITCH, camera, moved, mown, paint_frame, pair, wor
 from worker.calibration.relocalisation.relocalise import twin
 from worker.calibration.relocalisation.shared_ground import SharedGround
 
-LEFT, RIGHT = pair()
+# Small frames show ground as well.
+LEFT, RIGHT = (one.resized(640) for one in pair())
 OPPOSITE = camera("opposite", (10.0, 46.0, 12.0), (-5.0, 0.0))
-APART = camera("apart", (45.0, -50.0, 9.0), (60.0, -30.0))
+APART = camera("apart", (45.0, -50.0, 9.0), (60.0, -30.0)).resized(640)
 
 
 CAMERAS = {one.id: one for one in (LEFT, RIGHT, OPPOSITE, APART)}
