@@ -17,6 +17,12 @@ def service(stock):
         yield service
 
 
+def test_an_empty_service_says_what_to_do(service):
+    page = service.ask("GET", "/", headers={"Accept": "text/html"}).text
+    assert "No venue yet" in page
+    assert 'href="/ui/new-venue"' in page
+
+
 def test_a_camera_whose_pose_was_not_found_has_not_moved_by_nothing(stock, service):
     task = stock.attempts.begin(stock.submitted("v"))
     refused = result(task.venue, accepted=False)
