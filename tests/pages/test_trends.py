@@ -84,6 +84,7 @@ def drawn_colours(chart):
     return chart.evaluate(DRAWN)
 
 
+@pytest.mark.long
 def test_the_charts_fit_a_phone(stub, drifted, visit):
     page = visit(stub.url, drifted)
     page.set_viewport_size({"width": 390, "height": 800})

@@ -117,6 +117,7 @@ def test_both_clients_have_the_same_methods_with_the_same_signatures():
         assert blocking.__doc__
 
 
+@pytest.mark.long
 def test_who_follows_a_job_outlives_a_restart_of_the_service(start, frames):
     service = start().ready()
     port = httpx.URL(service.url).port

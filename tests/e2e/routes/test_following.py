@@ -68,6 +68,7 @@ def test_who_was_away_when_a_venue_was_deleted_is_told_so_once(service, name):
         assert service.http.get(f"/venues/{name}/events", headers={"Last-Event-ID": seen}).status_code == 404
 
 
+@pytest.mark.long
 @in_one_home_first
 def test_what_was_missed_is_told_by_another_process_after_a_restart(start):
     service = start("up").ready()

@@ -23,6 +23,7 @@ def receiver():
     hook.close()
 
 
+@pytest.mark.long
 def test_the_worker_that_is_killed_over_a_callback_sends_it_again_when_it_is_back(start, receiver):
     service = start("up", **LOCAL).ready()
     job = service.submitted(service.venue("v"), callback_url=receiver.url)

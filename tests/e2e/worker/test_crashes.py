@@ -74,6 +74,7 @@ def test_a_worker_on_another_machine_takes_over(start, worker_beside):
     assert [revision["cause"] for revision in history] == ["calibrated", "put"]
 
 
+@pytest.mark.long
 @in_one_home_first
 def test_a_worker_killed_at_any_moment_of_its_job_costs_it_an_attempt_and_nothing_else(start):
     service = start("up", ESC_TIDY_EVERY_S="0.5").ready()

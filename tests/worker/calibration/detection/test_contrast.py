@@ -1,6 +1,7 @@
 """Markings in paint of any colour, beside lines of other colours."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -37,10 +38,16 @@ def lines(colour):
     return replace(white, colour=np.full(len(white), colour))
 
 
+@cache
+def grain():
+    _, share = scene()
+    return np.random.default_rng(1).normal(0, 3, (*share.shape, 3)).astype(np.float32)
+
+
 def painted(ground, *layers):
     """Grain, and lines of several colours: (colour, how many columns aside)."""
     _, share = scene()
-    picture = np.random.default_rng(1).normal(ground, 3, (*share.shape, 3))
+    picture = np.array(ground, np.float32) + grain()
     for colour, aside in layers:
         there = np.roll(share, aside, axis=1)[..., None]
         picture += there * (np.array(PAINTS[colour]) - picture)
