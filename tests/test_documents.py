@@ -2,6 +2,7 @@
 
 import re
 import shlex
+from functools import cache
 from importlib import metadata
 from pathlib import Path
 
@@ -20,21 +21,8 @@ OPERATIONS = ROOT / "docker" / "README.md"
 SETTINGS = ROOT / "docs" / "settings.md"
 GLOSSARY = ROOT / "docs" / "glossary.md"
 INDEX = ROOT / "docs" / "README.md"
-DOCUMENTS = [
-    *(
-        ROOT / name
-        for name in (
-            "README.md",
-            "CHANGELOG.md",
-            "CONTRIBUTING.md",
-            "SECURITY.md",
-            "client/README.md",
-            "models/README.md",
-        )
-    ),
-    OPERATIONS,
-    *sorted((ROOT / "docs").glob("*.md")),
-]
+NAMES = ("README", "CHANGELOG", "CONTRIBUTING", "SECURITY", "client/README", "models/README")
+DOCUMENTS = [*(ROOT / f"{name}.md" for name in NAMES), OPERATIONS, *sorted((ROOT / "docs").glob("*.md"))]
 # The changelog tells what earlier versions said.
 OF_TODAY = [path for path in DOCUMENTS if path.name != "CHANGELOG.md"]
 INSTALL = re.compile(r"\bpip install ([^`#\n|]+)")
@@ -44,72 +32,73 @@ EXPLAINED_BY_THEIR_NAMES = {"id", "cameras", "pictures", "callback_url", "timeou
 OF_OTHERS = {"pycolmap"}
 
 
-@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
-def test_no_placeholder_is_left(document):
-    assert not re.search(r"@[A-Z_]+@|^[A-Z]{4,}$|\bTODO\b|\bTBD\b", document.read_text(), re.MULTILINE)
+def test_no_placeholder_is_left():
+    for document in DOCUMENTS:
+        assert not re.search(r"@[A-Z_]+@|^[A-Z]{4,}$|\bTODO\b|\bTBD\b", document.read_text(), re.MULTILINE), document
 
 
-@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
-def test_every_relative_link_leads_somewhere(document):
-    links = re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", document.read_text())
-    dead = [link for link in links if "://" not in link and not (document.parent / link).exists()]
-    assert dead == []
+def test_every_relative_link_leads_somewhere():
+    for document in DOCUMENTS:
+        links = re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", document.read_text())
+        dead = [link for link in links if "://" not in link and not (document.parent / link).exists()]
+        assert dead == [], document
 
 
-@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
-def test_every_anchor_of_a_link_is_a_heading(document):
-    links = re.findall(r"\]\(([^)#:]*)#([^)]+)\)", document.read_text())
-    targets = [(document.parent / path if path else document, anchor) for path, anchor in links]
-    assert [anchor for target, anchor in targets if anchor not in anchors(target)] == []
+def test_every_anchor_of_a_link_is_a_heading():
+    for document in DOCUMENTS:
+        links = re.findall(r"\]\(([^)#:]*)#([^)]+)\)", document.read_text())
+        targets = [(document.parent / path if path else document, anchor) for path, anchor in links]
+        assert [anchor for target, anchor in targets if anchor not in anchors(target)] == [], document
 
 
+@cache
 def anchors(document):
     """What the headings of a document are called in links, as GitHub makes it of their words."""
     headings = re.findall(r"^#+ (.+)$", document.read_text(), re.MULTILINE)
     return {re.sub(r"[^\w\- ]", "", heading).lower().replace(" ", "-") for heading in headings}
 
 
-@pytest.mark.parametrize("document", OF_TODAY, ids=lambda path: str(path.relative_to(ROOT)))
-def test_install_commands_name_what_a_reader_has_and_nothing_of_ours_on_an_index(document):
+def test_install_commands_name_what_a_reader_has_and_nothing_of_ours_on_an_index():
     """Anybody may claim the name of this package on PyPI, where it is not."""
     wheels = [f"{name}-{build.version()}-py3-none-any.whl" for name in ("esc_calibration", "esc_client")]
     extras = "|".join(metadata.metadata(build.PACKAGE).get_all("Provides-Extra"))
     ours = "|".join(map(re.escape, [*(f"./{wheel}" for wheel in wheels), *wheels, "./client", "."]))
     known = re.compile(rf"({ours})(\[({extras})\])?")
-    for command in INSTALL.findall(document.read_text()):
-        words = iter(shlex.split(command))
-        for word in words:
-            if word == "-r":
-                assert (document.parent / next(words)).is_file(), command
-            elif not word.startswith("-"):
-                assert known.fullmatch(word) or word in OF_OTHERS, command
+    for document in OF_TODAY:
+        for command in INSTALL.findall(document.read_text()):
+            words = iter(shlex.split(command))
+            for word in words:
+                if word == "-r":
+                    assert (document.parent / next(words)).is_file(), (document, command)
+                elif not word.startswith("-"):
+                    assert known.fullmatch(word) or word in OF_OTHERS, (document, command)
 
 
-@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
-def test_every_target_of_make_that_a_document_names_is_one(document):
+def test_every_target_of_make_that_a_document_names_is_one():
     targets = set(re.findall(r"^([a-z][a-z-]*):", (ROOT / "Makefile").read_text(), re.MULTILINE))
-    assert set(re.findall(r"\bmake ([a-z]+(?:-[a-z]+)*)`", document.read_text())) <= targets
-    assert set(re.findall(r"^make ([a-z]+(?:-[a-z]+)*)", document.read_text(), re.MULTILINE)) <= targets
+    for document in DOCUMENTS:
+        named = re.findall(r"\bmake ([a-z]+(?:-[a-z]+)*)`", document.read_text())
+        called = re.findall(r"^make ([a-z]+(?:-[a-z]+)*)", document.read_text(), re.MULTILINE)
+        assert {*named, *called} <= targets, document
 
 
-# The options of every command, by the words that call it.
-COMMANDS = {
-    words: {option for parameter in command.params for option in parameter.opts} | {"--help"}
-    for words, command in all_commands()
-    if not hasattr(command, "commands")
-}
-
-
-@pytest.mark.parametrize("document", OF_TODAY, ids=lambda path: str(path.relative_to(ROOT)))
-def test_every_command_of_esc_that_a_document_shows_has_the_options_it_shows(document):
-    blocks = re.findall(r"^```(?:sh|console)\n(.*?)^```", document.read_text(), re.DOTALL | re.MULTILINE)
-    for line in "".join(blocks).replace("\\\n", " ").splitlines():
-        called = re.search(r"(?:^|[ /])esc ((?:[a-z]+ ?)+)(.*)", line.partition(" # ")[0])
-        if called is None:
-            continue
-        name = max((name for name in COMMANDS if called[1].startswith(name)), key=len, default=None)
-        assert name, line
-        assert set(re.findall(r"(?<=\s)(--[a-z][a-z-]+)", called[2].partition("|")[0])) <= COMMANDS[name], line
+def test_every_command_of_esc_that_a_document_shows_has_the_options_it_shows():
+    # The options of every command, by the words that call it.
+    commands = {
+        words: {option for parameter in command.params for option in parameter.opts} | {"--help"}
+        for words, command in all_commands()
+        if not hasattr(command, "commands")
+    }
+    for document in OF_TODAY:
+        blocks = re.findall(r"^```(?:sh|console)\n(.*?)^```", document.read_text(), re.DOTALL | re.MULTILINE)
+        for line in "".join(blocks).replace("\\\n", " ").splitlines():
+            called = re.search(r"(?:^|[ /])esc ((?:[a-z]+ ?)+)(.*)", line.partition(" # ")[0])
+            if called is None:
+                continue
+            name = max((name for name in commands if called[1].startswith(name)), key=len, default=None)
+            assert name, (document, line)
+            options = set(re.findall(r"(?<=\s)(--[a-z][a-z-]+)", called[2].partition("|")[0]))
+            assert options <= commands[name], (document, line)
 
 
 def test_the_page_of_the_settings_is_that_of_the_code():

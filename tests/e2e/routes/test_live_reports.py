@@ -6,7 +6,7 @@ from contextlib import contextmanager
 import httpx
 import pytest
 
-from testbed.homes import in_both_homes
+from testbed.homes import in_one_home_first
 from testbed.running import DEADLINE_S, venue
 from tests.e2e.routes.event_stream import Stream
 
@@ -40,7 +40,7 @@ def followed(service, name):
         yield Stream(answer)
 
 
-@in_both_homes
+@in_one_home_first
 def test_the_newest_report_is_answered_followed_and_kept_by_the_minute(service, name):
     service.venue(name)
     address = f"/venues/{name}/live"
