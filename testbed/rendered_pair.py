@@ -1,46 +1,37 @@
-"""The demo's two cameras with small frames, for the real engine in tests, whose stored poses are outdated."""
+"""Two rendered cameras of a pitch whose stored poses are outdated, small enough for the real engine in tests."""
 
-import json
 from functools import cache
-from pathlib import Path
 
 import cv2
 import numpy as np
 
-import demo
+from models.training.pitches.render import Conditions, render_frame
 from testbed.synthetic import moved
 from testbed.venue_documents import venue_document
 from worker.calibration.geometry.camera import Camera, Pose
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.lens import Intrinsics
 
-DEMO = Path(demo.__file__).parent
 SIZE = (960, 540)
 PITCH = Field(105.0, 68.0, 0.12, np.array([[-18.5, 0.0, 0.35], [18.5, 0.0, 0.35]]))
 MOVED_M = np.array([0.06, -0.05, 0.04])
 TURNED = np.array([0.006, -0.005, 0.004])
 
 
-@cache
 def cameras() -> list[Camera]:
-    """The cameras as they really stand."""
-    poses = json.loads((DEMO / "truth.json").read_text())["poses"]
-    standing = []
-    for camera in json.loads((DEMO / "venue.json").read_text())["cameras"]:
-        matrix, distortion = (np.array(camera["intrinsics"][name]) for name in ("matrix", "distortion"))
-        pose = Pose(*(np.array(poses[camera["id"]][name]) for name in ("rotation", "position")))
-        standing.append(Camera(camera["id"], Intrinsics(matrix, distortion, tuple(camera["image_size"])), pose))
-    return [camera.resized(SIZE[0]) for camera in standing]
+    lens = Intrinsics(
+        np.array([[615.0, 0, 480.5], [0, 615.0, 267.5], [0, 0, 1]]), np.array([-0.3, 0.08, 0, 0, 0]), SIZE
+    )
+    return [
+        Camera("left", lens, Pose.looking_at([-0.9, -48.0, 12.0], [-22.0, -12.0, 0.0])),
+        Camera("right", lens, Pose.looking_at([0.8, -48.0, 12.0], [22.0, -12.0, 0.0])),
+    ]
 
 
 @cache
 def frames() -> dict[str, bytes]:
-    return {c.id: encoded(picture(c.id)) for c in cameras()}
-
-
-def picture(camera: str) -> np.ndarray:
-    """The frame (H, W, 3) of a camera."""
-    return cv2.imread(str(DEMO / f"{camera}.jpg"), cv2.IMREAD_REDUCED_COLOR_4)
+    rng = np.random.default_rng(0)
+    return {c.id: encoded(render_frame(PITCH, c, Conditions.fair(22), rng).frame) for c in cameras()}
 
 
 def encoded(frame: np.ndarray) -> bytes:

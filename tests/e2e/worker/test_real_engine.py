@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
+from testbed import demo_pair
 from testbed.rendered_pair import PITCH, SIZE, cameras, frames, venue
 from testbed.running import Service
 from worker.calibration.geometry.rotation import rotation_angles_deg
@@ -32,10 +33,10 @@ def stored_position(service: Service, name: str, index: int = 0) -> list[float]:
 
 
 def test_outdated_poses_are_found_again_and_stored(service, name):
-    job = calibrated(service, venue(name), frames())
+    job = calibrated(service, demo_pair.venue(name), demo_pair.frames())
     result = job["result"]
     assert result["rejected_because"] is None
-    for truth, camera in zip(cameras(), result["cameras"], strict=True):
+    for truth, camera in zip(demo_pair.cameras(), result["cameras"], strict=True):
         assert np.linalg.norm(np.array(camera["pose"]["position"]) - truth.pose.position) < 0.12
         assert rotation_angles_deg(camera["pose"]["rotation"], truth.pose.rotation) < 0.15
     assert result["stitch_error_px"] < 1 < result["stitch_error_before_px"]

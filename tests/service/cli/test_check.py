@@ -17,7 +17,7 @@ from service.formats.reading import read_paths
 from service.formats.records import CameraRecord
 from service.observability import logs
 from service.schemas.geometry import Intrinsics, Pose
-from testbed import rendered_pair
+from testbed import demo_pair, rendered_pair
 from testbed.spoiling import darkened
 
 pytestmark = pytest.mark.slow
@@ -37,6 +37,13 @@ def record(camera):
 def records():
     """The true cameras of the pair."""
     return [record(one) for one in rendered_pair.cameras()]
+
+
+def filmed(folder, camera, frame):
+    """The record of a camera of which a folder has a frame and the field."""
+    (folder / f"{camera.id}.jpg").write_bytes(rendered_pair.encoded(frame))
+    (folder / "site.json").write_text(SITE)
+    return record(camera)
 
 
 @pytest.fixture(scope="module")
@@ -94,12 +101,12 @@ def test_a_crown_that_nobody_said_is_no_motion_of_the_cameras(tmp_path, capsys, 
         assert "ridge 0." in answer["warnings"][0]
 
 
-def test_centimetres_and_a_turn_are_told_and_corrected(tmp_path, frames, capsys):
-    true = records()[0]
+def test_centimetres_and_a_turn_are_told_and_corrected(tmp_path, capsys):
+    true = filmed(tmp_path, demo_pair.cameras()[0], demo_pair.picture("left"))
     turned = [true.pose.rotation[0] + math.radians(0.6), *true.pose.rotation[1:]]
     given = replace(true, pose=Pose.from_position(turned, [100 * metres for metres in true.pose.position]))
     output = tmp_path / "corrected.toml"
-    code, answer, _ = run(tmp_path, frames, [given], "pose2sim", capsys, output=output)
+    code, answer, _ = run(tmp_path, tmp_path, [given], "pose2sim", capsys, output=output)
     assert (code, answer["grade"]) == (3, "wrong")
     (checked,) = answer["cameras"]
     assert [cause["cause"] for cause in checked["causes"]] == ["centimetres", "turned"]
@@ -109,17 +116,14 @@ def test_centimetres_and_a_turn_are_told_and_corrected(tmp_path, frames, capsys)
 
 
 def test_coefficients_in_another_order_are_told_and_not_taken_for_a_turn(tmp_path, capsys):
-    taken_by = rendered_pair.cameras()[0]
+    taken_by = demo_pair.cameras()[0]
     k1, k2, p1, p2, k3 = bent = [-0.302, 0.1, 0.002, -0.001, -0.006]
     camera = taken_by.with_lens(replace(taken_by.intrinsics, distortion=np.array(bent)))
     # What that lens would have shown.
-    pixels = np.stack(np.meshgrid(*map(np.arange, rendered_pair.SIZE)), axis=-1).astype(float)
+    pixels = np.stack(np.meshgrid(*map(np.arange, camera.intrinsics.size)), axis=-1).astype(float)
     there = taken_by.project(camera.pose.position + camera.rays(pixels)).astype(np.float32)
-    taken = rendered_pair.picture("left")
-    frame = cv2.remap(taken, there, None, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
-    (tmp_path / "left.jpg").write_bytes(rendered_pair.encoded(frame))
-    (tmp_path / "site.json").write_text(SITE)
-    true = record(camera)
+    shown = cv2.remap(demo_pair.picture("left"), there, None, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
+    true = filmed(tmp_path, camera, shown)
     written = true.intrinsics.model_copy(update={"distortion": [k1, k2, k3, p1, p2]})
     code, answer, _ = run(tmp_path, tmp_path, [replace(true, intrinsics=written)], "mrcal", capsys)
     assert (code, answer["grade"]) == (3, "wrong")

@@ -7,7 +7,7 @@ import pytest
 from service.schemas.options import Options
 from service.schemas.venue import VenueIn
 from service.settings import MODEL_BESIDE_THE_CODE
-from testbed import rendered_pair
+from testbed import demo_pair
 from testbed.by_models import solve
 from tests.architecture import ROOT
 from worker.calibration.records import NOT_RECORDED
@@ -20,8 +20,8 @@ OF_CAMERA = ("view.json", "response.png", "lines.json", "lines.jpg", "residuals.
 
 
 def solved(recorder=NOT_RECORDED):
-    venue = VenueIn.model_validate(rendered_pair.venue("v")).to_venue()
-    files = {camera: [frame] for camera, frame in rendered_pair.frames().items()}
+    venue = VenueIn.model_validate(demo_pair.venue("v")).to_venue()
+    files = {camera: [frame] for camera, frame in demo_pair.frames().items()}
     resources, options = (
         ComputeResources(model=MODEL_BESIDE_THE_CODE, threads=1),
         Options(seed=1, search="wide", generations=20),
@@ -65,7 +65,7 @@ def test_lines_lie_on_the_paint_and_their_residuals_shrink(recorded, camera):
     lines = json.loads(recorded[1][f"{camera}.lines.json"])
     assert lines["rms_px"] < 0.2 * lines["rms_before_px"]
     response = cv2.imdecode(np.frombuffer(recorded[1][f"{camera}.response.png"], np.uint8), cv2.IMREAD_GRAYSCALE)
-    frame = cv2.imdecode(np.frombuffer(rendered_pair.frames()[camera], np.uint8), cv2.IMREAD_GRAYSCALE)
+    frame = cv2.imdecode(np.frombuffer(demo_pair.frames()[camera], np.uint8), cv2.IMREAD_GRAYSCALE)
     scale = response.shape[1] / frame.shape[1]
     column, row = np.rint((np.array(lines["pixel"]) + 0.5) * scale - 0.5).astype(int).T
     sure = np.array(lines["weight"]) > 0.5
