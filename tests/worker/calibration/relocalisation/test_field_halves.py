@@ -76,15 +76,15 @@ def test_a_camera_stands_where_the_ground_looks_as_another_one_sees_it_even_oppo
 
 @pytest.mark.long
 def test_a_camera_opposite_another_one_is_not_taken_to_stand_beside_it_where_the_ground_speaks_against_that():
-    # Correlations of 0.3 decide nothing, and are more than none.
+    # Correlations of less than 0.2 decide nothing, and are more than none.
     worn_frame = worn(PITCH, FACING, paint_frame(PITCH, FACING))
-    noise = np.random.default_rng(1).normal(0, 120, worn_frame.shape)
+    noise = np.random.default_rng(1).normal(0, 180, worn_frame.shape)
     noisy = np.clip(worn_frame + noise, 0, 255).astype(np.uint8)
     frames = {"left": worn(PITCH, LEFT, paint_frame(PITCH, LEFT)), "facing": noisy}
     ground = SharedGround.of(PITCH, frames)
     compared = ground.compare([FACING, twin(FACING)], [LEFT])
     assert compared.right is None
-    assert compared.correlations[0] > 0.15
+    assert compared.correlations[0] > 0.12
     _, second = choose_sides([LEFT, FACING], anywhere(LEFT, FACING), [], ground)
     assert not second.decided
 
