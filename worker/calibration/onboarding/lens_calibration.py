@@ -325,10 +325,10 @@ def _known_to(chosen: _Chosen) -> dict[str, float]:
     """
     lens = chosen.best.fit.lens
     known = _worse(*chosen.best.deviations)
-    open_terms = [name for name in PARAMETERS[lens.model][2 : 4 + len(lens.distortion)] if name not in known]
+    # All but focal lengths, which a lens has either one of or two.
+    terms = PARAMETERS[lens.model][2 : 4 + len(lens.distortion)]
     for tried in chosen.tried:
-        richer = _worse(*tried.deviations)
-        known = {name: richer[name] for name in open_terms if name in richer} | known
+        known = {name: sigma for name, sigma in _worse(*tried.deviations).items() if name in terms} | known
     if "f" in known:
         one = known.pop("f")
         return {"fx": one, "fy": one, **known}

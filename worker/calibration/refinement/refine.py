@@ -33,7 +33,8 @@ SEARCH_PX = (14.0, 8.0, 5.0)
 """Half width of the search for lines round by round, in pixels of a 4K frame."""
 EVALUATION_SEARCH_PX = 8.0
 CLEARLY_MORE = 0.02
-"""Growth of the share of lines that are found, by which one pose is better than another."""
+"""Growth of the share of lines that are found, by which one pose is better than another: more than the noise of a share
+from one reading of a frame to the next."""
 MOST_STEPS = 4
 """Most steps of a coarse round."""
 NOT_LOOKED_AT: NDArray[np.float32] = np.zeros((1, 1), dtype=np.float32)
@@ -184,11 +185,10 @@ class _Refiner:
         measured = self.reader.measure(lines, estimate.cameras, SEARCH_PX[-1])
         share = max(measured_shares(lines, estimate.cameras, measured))
         # What is not measured may yet be seen, which takes longer to tell.
-        return share if share > 0.5 else max(one.agreement for one in self.evidence(estimate))
+        return share if share > 0.5 else max(one.agreement for one in self.evidence(estimate, lines))
 
-    def evidence(self, estimate: Estimate) -> list[Evidence]:
-        """Return the evidence for the lines of the field where the cameras put them."""
-        lines = estimate.on_ground(self.unknowns)
+    def evidence(self, estimate: Estimate, lines: LinePoints) -> list[Evidence]:
+        """Return the evidence for the `lines` of the field, on its ground, where the cameras put them."""
         return self.reader.evidence(estimate.pitch, lines[~lines.end_to_end], estimate.cameras)
 
     def settle(self, estimate: Estimate) -> GaussNewtonStep:
@@ -341,7 +341,7 @@ def _assessed(
 ) -> RefinedPoses:
     refiner = refiner.around(estimate)
     lines, reader = estimate.on_ground(refiner.unknowns), refiner.reader
-    evidence = refiner.evidence(estimate)
+    evidence = refiner.evidence(estimate, lines)
     everything = _of_seen(estimate.pitch, reader.measure(lines, estimate.cameras, EVALUATION_SEARCH_PX), evidence)
     measured = with_misfit_noise(estimate, refiner.without_repainted(everything))
     # A field that is wrong looks like a ground that swells a lot: judged, it has to be an ordinary ground.
