@@ -13,7 +13,7 @@ from subprocess import Popen
 
 import httpx
 
-from testbed.running import Service, children, wait_for
+from testbed.running import Service, computing, wait_for
 
 # Beyond the time that something takes when nobody disturbs it: the last moments of it are of interest too.
 A_LITTLE_LONGER = 1.1
@@ -75,7 +75,7 @@ def kill_worker_of_several(service: Service, workers: dict[str, Popen], venue: s
     """Kill the worker that computes the job, or the first, at a moment of a job; it stays dead until the job ended."""
     job = service.submit(venue).raise_for_status().json()["id"]
     time.sleep(after_s)
-    name = next((name for name, process in workers.items() if children(process.pid)), next(iter(workers)))
+    name = next((name for name, process in workers.items() if computing(process.pid)), next(iter(workers)))
     workers[name].kill()
     killed = time.monotonic()
     workers[name].wait()

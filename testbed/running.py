@@ -226,6 +226,11 @@ def children(process: int) -> list[int]:
     return [int(child) for file in files for child in file.read_text().split()]
 
 
+def computing(worker: int) -> list[int]:
+    """Process ids of the jobs of a worker: those of its children that read a temporary file, which has no name."""
+    return [child for child in children(worker) if "(deleted)" in str(Path(f"/proc/{child}/fd/0").readlink())]
+
+
 def leads_a_session(process: int) -> bool:
     with suppress(ProcessLookupError):
         return os.getsid(process) == process

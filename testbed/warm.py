@@ -2,16 +2,13 @@
 
 Imports are most of a start.
 
-Each is a real process and a child of the one that asked, as `subprocess.Popen` makes them: the warm parent forks twice,
-and whoever asked is the nearest subreaper (prctl(2)) of what the first fork leaves behind. What a process reads before
-the first line of `service.cli` it has of the warm parent: who tests that, starts it cold. Elsewhere than on Linux, and
-with another interpreter or other paths of modules, every start is cold.
+Each is a real process and a child of the one that asked, as `subprocess.Popen` makes them: see `worker.fork_server`.
+What a process reads before the first line of `service.cli` it has of the warm parent: who tests that, starts it cold.
+Elsewhere than on Linux, and with another interpreter or other paths of modules, every start is cold.
 """
 
-import array
 import asyncio
 import atexit
-import ctypes
 import functools
 import gc
 import importlib
@@ -29,8 +26,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from testbed.shared_caches import share_caches
+from worker.fork_server import adopt_orphans, fork_by, serve
 
-PR_SET_CHILD_SUBREAPER = 36
 # All that a service, a worker or a command loads sooner or later.
 IMPORTED = (
     "fastapi",
@@ -53,9 +50,12 @@ IMPORTED = (
     "uvicorn.lifespan.on",
     "uvicorn.loops.auto",
     "worker.programs.stitch.__main__",
+    "worker.jobs.calibration",
+    "onnxruntime",
 )
-# Programs that an API starts for single requests.
+# Programs that an API starts for single requests, and what a worker starts its jobs by.
 PROGRAMS = (
+    "worker.fork_server",
     "worker.programs.clicked_pose",
     "worker.programs.draw",
     "worker.programs.plan",
@@ -65,7 +65,6 @@ PROGRAMS = (
 )
 # What the interpreter reads as it starts.
 OF_THE_INTERPRETER = "PYTHON"
-LONGEST_REQUEST = 1 << 20
 
 
 class Popen(subprocess.Popen):
@@ -125,14 +124,14 @@ class WarmParent:
     """The end of the socket that asks."""
 
     def __init__(self) -> None:
-        ctypes.CDLL(None).prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
+        adopt_orphans()
         self._asking = threading.Lock()
         self._socket, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         with theirs:
             self._begin(theirs)
 
     def _begin(self, theirs: socket.socket) -> None:
-        command = [sys.executable, "-m", "testbed.warm", str(theirs.fileno()), str(os.getpid())]
+        command = [sys.executable, "-m", "testbed.warm", str(theirs.fileno())]
         self._process = subprocess.Popen(
             command, cwd=Path(__file__).parents[1], stdin=subprocess.DEVNULL, pass_fds=[theirs.fileno()]
         )
@@ -144,12 +143,8 @@ class WarmParent:
         `place`: its folder, its environment, and whether it has a session of its own.
         """
         request = json.dumps([asked, *place]).encode()
-        rights = (socket.SOL_SOCKET, socket.SCM_RIGHTS, array.array("i", files))
         with self._asking:
-            self._socket.sendmsg([request], [rights])
-            answer = self._socket.recv(LONGEST_REQUEST)
-        assert answer, "the warm parent has ended"
-        return int(answer)
+            return fork_by(self._socket, request, files)
 
     def _end(self) -> None:
         self._socket.close()
@@ -157,19 +152,18 @@ class WarmParent:
 
 
 class ForkedParent(WarmParent):
-    """A warm parent that is forked from a service before that has threads, for its worker and its programs."""
+    """A warm parent that is forked from a service or worker before that has threads, for what it starts."""
 
     def _begin(self, theirs: socket.socket) -> None:
-        asking = os.getpid()
         if os.fork():
             return
         self._socket.close()
-        serve(theirs, asking)
+        become(*json.loads(serve(theirs)))
         sys.exit(run_module())
 
 
 def started_by(parent: ForkedParent) -> type[subprocess.Popen]:
-    """Return the `Popen` of a service, which has its worker and its programs forked."""
+    """Return the `Popen` of a service or worker, which has what it starts forked."""
 
     class Started(Popen):
         modules = ("service.cli", *PROGRAMS)
@@ -199,34 +193,6 @@ def become(asked: list[str], folder: str, environment: dict[str, str], new_sessi
     sys.argv[:] = [program.origin, *arguments]
 
 
-def serve(requests: socket.socket, asking: int) -> None:
-    """Fork a process for each request; returns in each of them, with what it shall be in place."""
-    while True:
-        request, ancillary, _, _ = requests.recvmsg(LONGEST_REQUEST, socket.CMSG_SPACE(3 * array.array("i").itemsize))
-        if not request:
-            os._exit(0)
-        files = array.array("i")
-        for _, _, data in ancillary:
-            files.frombytes(data)
-        between = os.fork()
-        if between:
-            for file in files:
-                os.close(file)
-            os.waitpid(between, 0)
-            continue
-        if os.fork():
-            os._exit(0)
-        # Only now can whoever asked wait for this process: before, it is no child of theirs.
-        while os.getppid() != asking:
-            time.sleep(0.001)
-        requests.send(str(os.getpid()).encode())
-        requests.close()
-        for number, file in enumerate(files):
-            os.dup2(file, number)
-            os.close(file)
-        return become(*json.loads(request))
-
-
 async def prepare_routes() -> None:
     """Have the routes ready that each service would make ready at its first request, by a request that none takes."""
     answer = []
@@ -245,7 +211,7 @@ def run_module() -> int | None:
     if sys.argv[0] in PROGRAMS:
         module, *arguments = sys.argv
         return sys.modules.get(f"{module}.__main__", sys.modules[module]).main(*arguments)
-    if sys.argv[1:2] in (["up"], ["serve"]):
+    if sys.argv[1:2] in (["up"], ["serve"], ["worker"]):
         subprocess.Popen = started_by(ForkedParent())
     return sys.modules["service.cli.main"].main()
 
@@ -263,7 +229,7 @@ def compile_statements() -> None:
 
 
 def main() -> None:
-    number, asking = map(int, sys.argv[1:])
+    requests = socket.socket(fileno=int(sys.argv[1]))
     for module in (*IMPORTED, *PROGRAMS):
         importlib.import_module(module)
     share_caches()
@@ -273,7 +239,7 @@ def main() -> None:
     assert len([*Path("/proc/self/task").iterdir()]) == 1, "a thread would be missing in what is forked"
     gc.collect()
     gc.freeze()
-    serve(socket.socket(fileno=number), asking)
+    become(*json.loads(serve(requests)))
     sys.exit(run_module())
 
 

@@ -7,6 +7,7 @@ import os
 import selectors
 import signal
 import subprocess
+import sys
 import tempfile
 import time
 from collections.abc import Iterator
@@ -21,6 +22,7 @@ from service.schemas.programs.files import split_files
 from service.settings import Settings
 from service.store.jobs.task import Task
 from worker.compute_resources import ComputeResources
+from worker.fork_server import ForkedProcess, ForkServer, ForkServerError
 from worker.protocol import Files, JobRequest, Message
 
 # Twice as often as a cancellation needs to reach the child.
@@ -29,6 +31,8 @@ MAX_LINE_BYTES = 16 * 1024 * 1024
 MAX_PICTURE_BYTES = 1024 * 1024 * 1024
 # For a process that has closed its output.
 EXIT_S = 10.0
+# What nearly all job programs load.
+LOADED = ("worker.jobs.calibration", "numpy.ma", "onnxruntime")
 log = structlog.get_logger()
 
 
@@ -36,23 +40,57 @@ class ProtocolError(Exception):
     """The output of the child process breaks the protocol of job programs."""
 
 
+class JobPrograms:
+    """Starts job programs: on Linux those that are modules by fork from a process that has loaded what they need."""
+
+    def __init__(self, settings: Settings) -> None:
+        self.resources = ComputeResources.of(settings)
+        self._command = settings.job_program
+        self._environment = child_process.without_secrets() | settings.native_environment
+        self._server: ForkServer | None = None
+        match self._command:
+            case [*interpreter, "-m", module] if sys.platform == "linux":
+                command = [*interpreter, "-m", "worker.fork_server", module, *LOADED]
+                self._server = ForkServer(command, self._environment)
+
+    def prepare(self) -> None:
+        """Load what the first job needs before it comes."""
+        if self._server is not None:
+            self._server.start()
+
+    def start(self, stdin: IO[bytes], stdout: int) -> "ForkedProcess | subprocess.Popen[bytes]":
+        """Start a job program with its standard input and output."""
+        if self._server is not None:
+            try:
+                return self._server.run(stdin.fileno(), stdout)
+            except ForkServerError as error:
+                log.warning("job programs start slowly", why=str(error))
+        return subprocess.Popen(self._command, stdin=stdin, stdout=stdout, env=self._environment)
+
+    def close(self) -> None:
+        """End what is kept for programs to come."""
+        if self._server is not None:
+            self._server.close()
+
+
 class JobProcess:
     """A running job program, killed when the `with` block is left. `pictures`: those of its result, by name."""
 
-    def __init__(self, settings: Settings, task: Task, files: Files) -> None:
+    def __init__(self, programs: JobPrograms, task: Task, files: Files) -> None:
         self.pictures: dict[str, bytes] = {}
-        # A file takes all of it, whether or not the program ever reads it; a pipe could fill up.
-        with tempfile.TemporaryFile() as given:
-            JobRequest.of(task, ComputeResources.of(settings), files).write(given, files)
-            given.seek(0)
-            self._process = subprocess.Popen(
-                settings.job_program,
-                stdin=given,
-                stdout=subprocess.PIPE,
-                env=child_process.without_secrets() | settings.native_environment,
-            )
-        assert self._process.stdout is not None
-        self._output: IO[bytes] = self._process.stdout
+        ours, its = os.pipe()
+        self._output = os.fdopen(ours, "rb")
+        try:
+            # A file takes all of it, whether or not the program ever reads it; a pipe could fill up.
+            with tempfile.TemporaryFile() as given:
+                JobRequest.of(task, programs.resources, files).write(given, files)
+                given.seek(0)
+                self._process = programs.start(given, its)
+        except BaseException:
+            self._output.close()
+            raise
+        finally:
+            os.close(its)
 
     def __enter__(self) -> "JobProcess":
         return self

@@ -35,7 +35,7 @@ from worker.duties.scheduler import Scheduler
 from worker.duties.webhook_delivery import WebhookDelivery
 from worker.heartbeat import BEAT_S, Heartbeat
 from worker.job_files import FileUnavailableError, JobFiles
-from worker.job_process import POLL_S, JobProcess
+from worker.job_process import POLL_S, JobProcess, JobPrograms
 from worker.lease import JobTimeoutError, Lease, LeaseLostError, Leases
 from worker.protocol import Files, Message
 from worker.result_checks import fault_in
@@ -85,6 +85,7 @@ class Worker:
         self._unreadable: set[str] = set()
         self._broken: set[str] = set()
         self._files = JobFiles(settings)
+        self._programs = JobPrograms(settings)
         self._queue = WorkerQueue(
             settings.home_database_url, settings.worker_name, settings.jobs_at_once, self._attempt
         )
@@ -109,6 +110,7 @@ class Worker:
     def start(self) -> None:
         """Send the first heartbeat and take jobs. Raises `AlreadyRunning` if a worker of this name runs elsewhere."""
         self._heartbeat.start()
+        self._programs.prepare()
         self._queue.start()
 
     def run_until(self, stop: threading.Event) -> None:
@@ -270,7 +272,7 @@ class Worker:
 
     def _run_program(self, task: Task, files: Files, lease: Lease, spans: Spans) -> tuple[Message, dict[str, bytes]]:
         """Run the job program; return its last message and the pictures that came with it."""
-        with JobProcess(self._settings, task, files) as child:
+        with JobProcess(self._programs, task, files) as child:
             for message in child.messages():
                 if message is None:
                     lease.check()

@@ -5,8 +5,8 @@
 other, so that what else the machine does hits both. Without it only this folder is measured. What was measured stays in
 `runs/bench/cost.jsonl` by the commit that it is of.
 
-Stages as a program reports them, seen from outside: `start` is everything before the network, `refinement` finish and
-judgement, `preview` the pictures. What the answer itself says of its stages comes after.
+Core-seconds are those of all processes of the service, so that imports count wherever they are made, and memory is that
+of the process that computes the job. The stages are those of the answer.
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import resource
 import statistics
 import subprocess
 import sys
@@ -22,33 +21,20 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import httpx
 
-from benchmarks.cost import metered
 from benchmarks.cost.cases import Case, case
+from benchmarks.processes import measured as costs_of
 from benchmarks.rows import Rows
 from testbed.running import ready, wait_for
 
 HERE = Path.cwd()
 ROWS = Rows(Path("runs/bench/cost.jsonl"))
-STAGES = ("start", "segmentation", "evolution", "refinement", "preview")
 # Of the seed a search's length depends.
 OPTIONS = json.dumps({"seed": 1, "dry_run": True})
-# What a release computes jobs with.
-PROGRAM = (
-    "import json; from service.settings import Settings; "
-    "print(json.dumps(Settings.model_fields['job_program'].default))"
-)
-# The program, and what it loads when it has seen that its job is a calibration.
-IMPORTS = """
-import importlib, importlib.util, sys
-kind = sys.argv[1].rpartition(".")[0] + ".calibration"
-importlib.import_module(sys.argv[1])
-importlib.util.find_spec(kind) and importlib.import_module(kind)
-"""
 # What the page of a venue shows.
 LOOKED_AT = ("preview.jpg",)
 
@@ -60,8 +46,7 @@ class Release:
     name: str
     commit: str
     folder: Path
-    program: list[str]
-    notes: Path
+    process: int
     http: httpx.Client
 
 
@@ -97,49 +82,37 @@ def row(release: Release, cameras: str, start: str, number: int) -> dict:
 def measure(release: Release, asked: Case) -> dict:
     """Measure a job from POST to its result, and then the time to fetch its pictures."""
     release.http.put(f"/venues/{asked.name}", json=asked.venue).raise_for_status()
-    release.notes.unlink(missing_ok=True)
     begun = time.monotonic()
     parts = [*asked.files.items(), ("options", (None, OPTIONS))]
-    job = release.http.post(f"/venues/{asked.name}/calibrate", files=parts).raise_for_status().json()
-    ended = wait_for(lambda: (now := release.http.get(f"/jobs/{job['id']}?wait=60").json())["finished_at"] and now, 600)
-    answered_s = time.monotonic() - begun
+    with costs_of(release.process) as cost:
+        job = release.http.post(f"/venues/{asked.name}/calibrate", files=parts).raise_for_status().json()
+        ended = wait_for(
+            lambda: (now := release.http.get(f"/jobs/{job['id']}?wait=60").json())["finished_at"] and now, 600
+        )
+        answered_s = time.monotonic() - begun
     result = ended["result"]
     if result is None or not result["accepted"]:
         raise SystemExit(f"{release.name}, {asked.name}: expected an accepted job, got {ended}")
-    note = json.loads(wait_for(lambda: release.notes.exists() and release.notes.read_text()).splitlines()[0])
     looking = time.monotonic()
     for picture in LOOKED_AT:
         release.http.get(f"/jobs/{job['id']}/{picture}").raise_for_status()
     return {
-        **note,
+        **asdict(cost),
         "answered_s": answered_s,
         "looked_s": time.monotonic() - looking,
-        "imports_s": imports_s(release),
         "timings_s": result["timings_s"],
         "cpu_s": result.get("cpu_s", {}),
         "poses": [camera["pose"]["position"] + camera["pose"]["rotation"] for camera in result["cameras"]],
     }
 
 
-def imports_s(release: Release) -> float:
-    """Core-seconds of an interpreter that imports what the program of a calibration does, and ends."""
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    command = [release.program[0], "-P", "-c", IMPORTS, release.program[-1]]
-    subprocess.run(command, cwd=release.folder, env=os.environ | _one_blas_thread(), check=True)
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-
-
 @contextmanager
 def running(name: str, folder: Path) -> Iterator[Release]:
-    """`esc up` of a clone, with the meter before its program of jobs."""
+    """`esc up` of a clone."""
     python = str(folder / ".venv/bin/python")
     commit = subprocess.check_output(["git", "-C", folder, "rev-parse", "--short", "HEAD"], text=True).strip()
     with tempfile.TemporaryDirectory(prefix="esc-cost-") as data:
-        notes = Path(data) / "notes"
-        program = json.loads(subprocess.check_output([python, "-c", PROGRAM], cwd=folder))
-        through = json.dumps([python, metered.__file__, str(notes), *program])
-        environment = {"ESC_DATA": data, "ESC_JOB_PROGRAM": through, "ESC_LOG_LEVEL": "warning"}
+        environment = {"ESC_DATA": data, "ESC_LOG_LEVEL": "warning"}
         command = [python, "-m", "service.cli", "up", "--port", "0"]
         with subprocess.Popen(
             command, cwd=folder, env=os.environ | environment, stdout=subprocess.PIPE, text=True
@@ -147,7 +120,7 @@ def running(name: str, folder: Path) -> Iterator[Release]:
             try:
                 with httpx.Client(base_url=service.stdout.readline().split()[-1], timeout=120) as http:
                     wait_for(lambda: ready(http))
-                    yield Release(name, commit, folder, program, notes, http)
+                    yield Release(name, commit, folder, service.pid, http)
             finally:
                 service.terminate()
 
@@ -159,11 +132,8 @@ def table(cameras: str, start: str, measured: dict[str, list[dict]]) -> Iterator
     yield f"\n{what}, {start}; medians of {runs}, core-seconds and seconds"
     yield f"\n| | {' | '.join(f'{name}: core s | s' for name in measured)} |"
     yield "|---|" + "---|---|" * len(measured)
-    lines: dict[str, tuple[Callable[[dict], float | None], Callable[[dict], float | None]]] = {
-        stage: (_stage(stage, 0), _stage(stage, 1)) for stage in STAGES
-    }
-    lines["imports, of `start`"] = (lambda row: row["imports_s"], lambda _: None)
-    lines["**the job's process**"] = (lambda row: row["core_s"], lambda row: row["wall_s"])
+    lines: dict[str, tuple[Callable[[dict], float | None], Callable[[dict], float | None]]] = {}
+    lines["**all its processes**"] = (lambda row: row["core_s"], lambda _: None)
     lines["POST to result"] = (lambda _: None, lambda row: row["answered_s"])
     lines["its preview, looked at then"] = (lambda _: None, lambda row: row["looked_s"])
     lines["peak memory, MB"] = (lambda row: row["peak_mb"], lambda _: None)
@@ -172,10 +142,6 @@ def table(cameras: str, start: str, measured: dict[str, list[dict]]) -> Iterator
     for title, values in lines.items():
         cells = [_median(rows, value) for rows in measured.values() for value in values]
         yield f"| {title} | {' | '.join(cells)} |"
-
-
-def _stage(stage: str, which: int) -> Callable[[dict], float | None]:
-    return lambda row: row["stages"][stage][which] if stage in row["stages"] else None
 
 
 def _said(what: str, stage: str) -> Callable[[dict], float | None]:
@@ -188,10 +154,6 @@ def _median(rows: Sequence[dict], value: Callable[[dict], float | None]) -> str:
         return ""
     middle = statistics.median(values)
     return f"{middle:.0f}" if middle >= 100 else f"{middle:.2f}"
-
-
-def _one_blas_thread() -> dict[str, str]:
-    return {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 
 
 if __name__ == "__main__":

@@ -3,6 +3,7 @@ import json
 import subprocess
 import sys
 import time
+from contextlib import closing
 
 import pytest
 
@@ -28,7 +29,7 @@ def child(tmp_path, program):
     settings = Settings(
         data=tmp_path, database_url=None, webhook_secret=None, job_program=[sys.executable, "-c", program]
     )
-    return children.JobProcess(settings, TASK, FILES)
+    return children.JobProcess(children.JobPrograms(settings), TASK, FILES)
 
 
 def test_a_child_that_never_ends_its_line_is_killed_and_not_waited_for(tmp_path):
@@ -52,6 +53,18 @@ def told(tmp_path, what):
     with child(tmp_path, program) as telling:
         (message,) = [message for message in telling.messages() if message]
     return message.error.detail
+
+
+@pytest.mark.parametrize("loaded", [children.LOADED, ("no_such_module",)])
+def test_a_program_is_started_whether_or_not_it_can_be_forked(loaded, tmp_path, monkeypatch):
+    monkeypatch.setattr(children, "LOADED", loaded)
+    settings = Settings(data=tmp_path, database_url=None, webhook_secret=None)
+    with (
+        closing(children.JobPrograms(settings)) as programs,
+        children.JobProcess(programs, TASK, {"left": [b"no picture"]}) as child,
+    ):
+        (*_, last) = [message for message in child.messages() if message]
+    assert last.error.type.endswith("broken-image")
 
 
 def test_a_child_computes_with_one_blas_thread(tmp_path):

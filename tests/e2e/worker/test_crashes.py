@@ -20,7 +20,7 @@ from testbed.killing import (
     seconds_of_a_submission,
     submitted,
 )
-from testbed.running import Service, alive, children, wait_for
+from testbed.running import Service, alive, computing, wait_for
 from tests.e2e.observe.figures import figures
 
 # Beyond the silence: until a worker looks, takes the job out of the queue and begins.
@@ -60,13 +60,12 @@ def test_a_worker_on_another_machine_takes_over(start, worker_beside):
     with service.jobs_held("v"):
         job = service.submitted(service.venue("v"))
         service.running(job)
-        (doomed,) = (worker for worker in workers if children(worker.pid))
-        (computing,) = children(doomed.pid)
+        ((doomed, process),) = ((worker, one) for worker in workers for one in computing(worker.pid))
         doomed.kill()
         killed = time.monotonic()
         wait_for(lambda: service.job(job)["attempt"] == 2)
         assert time.monotonic() - killed < silence_s + TAKING_OVER_S
-    assert not alive(computing)
+    assert not alive(process)
     ended = service.end(job)
     assert (ended["status"], ended["attempt"]) == ("succeeded", 2)
     assert poses(service, "v") == [-0.875, -0.875]
