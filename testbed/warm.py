@@ -50,7 +50,7 @@ IMPORTED = (
     "uvicorn.lifespan.on",
     "uvicorn.loops.auto",
     "worker.programs.stitch.__main__",
-    "worker.jobs.calibration",
+    "worker.jobs.program",
     "onnxruntime",
 )
 # Programs that an API starts for single requests, and what a worker starts its jobs by.

@@ -16,7 +16,6 @@ from service.schemas.results import Result
 from service.schemas.venue import Venue, VenueIn
 from service.store import database as database
 from service.store import movement
-from testbed.by_models import history_of, solve
 from testbed.stock import Stock
 from testbed.synthetic import CROWNED, camera, paint_frame
 from worker.calibration.geometry.camera import Camera
@@ -25,6 +24,7 @@ from worker.calibration.geometry.parameters import with_focal_length
 from worker.compute_resources import ComputeResources
 from worker.duties.alarms import AlarmTimer
 from worker.jobs import pictures
+from worker.jobs.calibration import NightHistory, solve
 
 VENUE = "v"
 SIZE, FOCAL, LENS = (640, 360), 400.0, (-0.12, 0.02, 0.0, 0.0, 0.0)
@@ -123,7 +123,7 @@ class Year:
         task = self.home.attempts.begin(self.home.submitted(VENUE, generations=40, parents=32, offspring=64))
         assert task is not None
         means = ComputeResources.of(self.home.settings)
-        found = solve(task.venue, files, task.options, means, lambda _: None, history_of(task))
+        found = solve(task.venue, files, task.options, means, lambda _: None, NightHistory.of(task))
         self.home.attempts.finish(task, found.result, [], found.memories)
         self.job = task.job_id
         return found.result

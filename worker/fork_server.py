@@ -4,7 +4,7 @@ The server sees no request: each run reads its own standard input. A run is a ch
 one of `subprocess.Popen` is: the server forks twice, and that process is the nearest subreaper (prctl(2)) of what the
 first fork leaves behind. Linux only.
 
-`python -m worker.fork_server PROGRAM MODULE...` is the server of a module `PROGRAM`, and imports the others first.
+`python -m worker.fork_server PROGRAM MODULE...` is the server of a module `PROGRAM`; it imports the others, too.
 """
 
 import contextlib
@@ -112,10 +112,10 @@ def main(program: str, *modules: str) -> None:
     """Import, then fork for each request; run the program in what was forked."""
     # A terminal sends it to all of its processes: this one ends with the one that started it.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    for module in modules:
+    for module in (program, *modules):
         importlib.import_module(module)
     if len(os.listdir("/proc/self/task")) > 1:  # noqa: PTH208  (no path is needed)
-        raise RuntimeError(f"{' '.join(modules)} started threads, which a fork would lack")
+        raise RuntimeError(f"{program} started threads, which a fork would lack")
     # What is shared stays shared: the collector of a run does not write to it.
     gc.collect()
     gc.freeze()

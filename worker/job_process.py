@@ -31,8 +31,8 @@ MAX_LINE_BYTES = 16 * 1024 * 1024
 MAX_PICTURE_BYTES = 1024 * 1024 * 1024
 # For a process that has closed its output.
 EXIT_S = 10.0
-# What nearly all job programs load.
-LOADED = ("worker.jobs.calibration", "numpy.ma", "onnxruntime")
+# What jobs load beside their program, once they need it.
+LOADED = ("numpy.ma", "onnxruntime", "worker.calibration.recovery")
 log = structlog.get_logger()
 
 

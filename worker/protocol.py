@@ -2,9 +2,6 @@
 
 In: a line of JSON, a `JobRequest`, and the bytes of the files. Out: lines of JSON, a `Message` each; the bytes of
 the pictures follow the line that announces them. So the program needs no store, and nobody tidies up after it.
-
-These are the worker's models of it, which check what comes out of a program. The program itself reads and writes plain
-JSON, see `worker.jobs.program`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -12,6 +9,7 @@ from typing import IO, Any, assert_never
 
 from pydantic import BaseModel
 
+from service.schemas.base import TOLERANTLY
 from service.schemas.check import CheckResult
 from service.schemas.job import JobError, Progress
 from service.schemas.results import AnyResult, FieldResult, FindResult, IntrinsicsResult, LocateResult, Result
@@ -43,6 +41,12 @@ class JobRequest(BaseModel):
         stream.write(self.model_dump_json().encode() + b"\n")
         for several in files.values():
             stream.writelines(several)
+
+    @classmethod
+    def read(cls, stream: IO[bytes]) -> tuple["JobRequest", Files]:
+        """Return a request that was written, and its files."""
+        request = cls.model_validate_json(stream.readline(), **TOLERANTLY)
+        return request, {name: [stream.read(size) for size in several] for name, several in request.sizes.items()}
 
 
 class Message(BaseModel):

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 def refuse(result: "Result", because: str, reason: str = "all-or-none") -> "Result":
     """Return a result with every pose refused, for a reason of `REFUSAL_REASONS` (`service.schemas.problems`).
 
-    The reasons that it was rejected for before stay. It may also be a document of `worker.jobs.documents`.
+    The reasons that it was rejected for before stay.
     """
     cameras = [
         camera.model_copy(

@@ -14,11 +14,12 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="prctl(2) and /p
 
 PROGRAM = """
 import os, sys, time
-print(os.getppid(), LOADED := "heavy" in sys.modules, end=" ", flush=True)
-word = sys.stdin.read()
-print(word, flush=True)
-time.sleep(60 if word == "sleep" else 0)
-sys.exit(word == "fail" and 3)
+if __name__ == "__main__":
+    print(os.getppid(), "heavy" in sys.modules, end=" ", flush=True)
+    word = sys.stdin.read()
+    print(word, flush=True)
+    time.sleep(60 if word == "sleep" else 0)
+    sys.exit(word == "fail" and 3)
 """
 HEAVY = "import os; open('imports', 'a').write('.')"
 THREADED = "import threading, time; threading.Thread(target=time.sleep, args=(60,), daemon=True).start()"
@@ -80,7 +81,7 @@ def test_a_server_that_died_is_replaced(server):
 def test_a_server_with_threads_starts_nothing(server, capfd):
     with closing(server_of("threaded")) as threaded, pytest.raises(ForkServerError, match="no process could be forked"):
         said(threaded, "one")
-    assert "threaded started threads, which a fork would lack" in capfd.readouterr().err
+    assert "program started threads, which a fork would lack" in capfd.readouterr().err
 
 
 def test_a_server_ends_with_the_process_that_started_it(server):

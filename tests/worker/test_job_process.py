@@ -12,7 +12,7 @@ from service.schemas.venue import VENUE_EXAMPLE, VenueIn
 from service.settings import Settings
 from service.store.jobs.task import Task
 from worker import job_process as children
-from worker.jobs.program import read_request
+from worker.protocol import JobRequest
 
 VENUE = VenueIn.model_validate(VENUE_EXAMPLE).to_venue()
 TASK = Task(
@@ -72,10 +72,9 @@ def test_a_child_computes_with_one_blas_thread(tmp_path):
 
 
 def test_a_child_is_given_its_task_and_its_files_but_not_the_address_that_is_told_of_its_end(tmp_path):
-    given, files = read_request(io.BytesIO(told(tmp_path, "sys.stdin.read()").encode()))
-    task = Task.model_validate(given["task"])
-    assert (task, files) == (TASK.without_addresses(), FILES)
-    assert (task.venue, task.options.seed, task.options.callback_url) == (VENUE, 7, None)
+    request, files = JobRequest.read(io.BytesIO(told(tmp_path, "sys.stdin.read()").encode()))
+    assert (request.task, files) == (TASK.without_addresses(), FILES)
+    assert (request.task.venue, request.task.options.seed, request.task.options.callback_url) == (VENUE, 7, None)
 
 
 def drawing(tmp_path, sizes, data):
@@ -126,8 +125,8 @@ def test_a_child_inherits_no_secret_and_no_way_to_the_files(tmp_path, monkeypatc
 
 LOADED = """
 import sys
-import worker.jobs.program, {}
-print(*{{name.partition(".")[0] for name in sys.modules}} - sys.stdlib_module_names)
+import worker.jobs.program
+print(*{name.partition(".")[0] for name in sys.modules} - sys.stdlib_module_names)
 """
 NOTHING_OF = {
     *("fastapi", "starlette", "uvicorn", "httpx", "jinja2"),
@@ -136,20 +135,8 @@ NOTHING_OF = {
 }
 
 
-def loaded_by(*modules):
-    """The packages that a program of jobs has loaded with these modules of it."""
-    command = [sys.executable, "-P", "-c", LOADED.format(", ".join(f"worker.jobs.{module}" for module in modules))]
-    return set(subprocess.run(command, capture_output=True, text=True, check=True).stdout.split())
-
-
 def test_what_computes_a_job_loads_nothing_of_the_web_the_database_or_the_store():
-    loaded = loaded_by("calibration", "field", "find", "intrinsics", "locate")
-    # The last reads the tasks of all kinds but one.
+    command = [sys.executable, "-P", "-c", LOADED]
+    loaded = set(subprocess.run(command, capture_output=True, text=True, check=True).stdout.split())
     assert loaded >= {"numpy", "cv2", "pydantic"}
     assert not loaded & NOTHING_OF
-
-
-def test_a_calibration_begins_without_the_models_of_the_wire_and_without_the_network():
-    loaded = loaded_by("calibration")
-    assert loaded >= {"numpy", "cv2"}
-    assert not loaded & {"pydantic", "pydantic_core", "annotated_types", "onnxruntime"}

@@ -6,11 +6,17 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from datetime import datetime
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from service.schemas.job import Progress
 from service.schemas.lens_map import lens_warnings
+from service.schemas.options import Options
 from service.schemas.refusals import refuse
+from service.schemas.results import AdoptableNumber, CameraResult, Result, Suspicion, View
+from service.schemas.trend import Anchor
+from service.schemas.venue import Venue
 from service.store.jobs.files import names_of_all
+from service.store.jobs.task import Task
 from worker.calibration import records as engine
 from worker.calibration.calibrate import calibrate
 from worker.calibration.detection.view_condition import UsualView
@@ -21,7 +27,6 @@ from worker.calibration.memory.camera_memory import CameraMemory, memories_of_fi
 from worker.calibration.refinement import diagnosis
 from worker.calibration.stitching.photometry import Light
 from worker.compute_resources import ComputeResources
-from worker.jobs.documents import AdoptableNumber, CameraResult, Progress, Result, Suspicion, View
 from worker.jobs.frames_job import FramesJob
 from worker.jobs.from_schemas import light_of
 from worker.jobs.masks import masks
@@ -38,11 +43,6 @@ from worker.jobs.to_schemas import (
     round_to_ms,
 )
 
-if TYPE_CHECKING:
-    from service.schemas.options import Options
-    from service.schemas.trend import Anchor
-    from service.schemas.venue import Venue
-
 
 @dataclass(frozen=True)
 class NightHistory:
@@ -56,6 +56,11 @@ class NightHistory:
     memories: Mapping[str, dict[str, Any]] = field(default_factory=dict)
     anchors: Mapping[str, Anchor] = field(default_factory=dict)
     taken_at: datetime | None = None
+
+    @classmethod
+    def of(cls, task: Task) -> NightHistory:
+        """Return the history that a task carries."""
+        return cls(task.last_views, task.memories, task.anchors, task.taken_at)
 
     @property
     def usual(self) -> dict[str, UsualView]:
@@ -79,7 +84,6 @@ def solve(
     """Calibrate a venue from the files of its cameras, by what is known of its `nights`.
 
     `pictures`: names of those to draw, by `names_of_all`; None: as the options say.
-    `venue` and `options` may be models or documents of `worker.jobs.documents`; the result is a document.
     """
     job = FramesJob.prepare(venue, files, options, means, report)
     memories = read_memories(nights.memories)

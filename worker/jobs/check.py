@@ -10,6 +10,7 @@ import numpy as np
 from service.schemas.check import GRADES, CameraCheck, CheckCause, CheckedCamera, CheckedFile, CheckResult
 from service.schemas.frame_sizes import is_resized, other_shape
 from service.schemas.geometry import Pose
+from service.schemas.job import Progress
 from service.schemas.lens_map import LEAST_BLIND_SHARE, map_of, times_larger
 from worker.calibration.checking.check import GivenCamera, check_cameras
 from worker.calibration.checking.grade import GradedCamera, grade
@@ -17,7 +18,6 @@ from worker.calibration.geometry import camera as engine
 from worker.calibration.geometry.lens import Lens
 from worker.compute_resources import ComputeResources
 from worker.jobs.decoding import decode_frames, size_of
-from worker.jobs.documents import Progress
 from worker.jobs.from_schemas import JobFailedError, lens_of, pitch_of
 from worker.jobs.to_schemas import (
     Solution,

@@ -4,13 +4,13 @@ import logging
 from collections.abc import Callable, Mapping, Sequence
 
 from service.schemas.field import FieldOfPlay
+from service.schemas.job import Progress
 from service.schemas.options import FieldOptions
 from service.schemas.results import FieldResult, MeasureResult
 from service.schemas.venue import Venue
 from worker.calibration.field_fit.measures import FieldFit, Measure, fit_field
 from worker.calibration.rendering.overlays import overlay
 from worker.compute_resources import ComputeResources
-from worker.jobs.documents import Progress
 from worker.jobs.frames_job import FramesJob
 from worker.jobs.from_schemas import encode_jpeg
 from worker.jobs.to_schemas import Solution, camera_to_schema, field_to_schema, finite_or_none, round_to_ms

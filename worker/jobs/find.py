@@ -11,9 +11,10 @@ import numpy as np
 from service.schemas.find import SoughtCameraIn, SoughtSite
 from service.schemas.geometry import Intrinsics, PosedCamera
 from service.schemas.geometry import Pose as PoseSchema
+from service.schemas.job import Progress
 from service.schemas.lens_map import lens_doubts
 from service.schemas.names import Panorama as PanoramaModel
-from service.schemas.results import CandidateResult, FindResult, FoundCameraResult
+from service.schemas.results import CandidateResult, FindResult, FoundCameraResult, Provenance
 from service.store.jobs.files import candidate_picture_name
 from worker.calibration.find_cameras import FoundCamera, FoundCameras, find_cameras
 from worker.calibration.geometry.camera import Camera
@@ -37,7 +38,6 @@ from worker.calibration.relocalisation.sought import (
 from worker.calibration.rendering.overlays import candidate_picture
 from worker.compute_resources import ComputeResources
 from worker.jobs.decoding import decode_frames, size_of
-from worker.jobs.documents import Progress, Provenance
 from worker.jobs.from_schemas import (
     Picture,
     camera_of,

@@ -6,10 +6,14 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import cv2
 
+from service.schemas.job import Progress
+from service.schemas.options import FieldOptions, Options
+from service.schemas.results import Provenance
+from service.schemas.venue import Camera as VenueCamera
+from service.schemas.venue import Venue
 from worker.calibration import records
 from worker.calibration.detection.segmentation import Segmenter
 from worker.calibration.geometry.camera import Camera
@@ -17,7 +21,6 @@ from worker.calibration.geometry.field import Field
 from worker.calibration.records import StageTimings
 from worker.compute_resources import ComputeResources
 from worker.jobs.decoding import decode_frame
-from worker.jobs.documents import Progress, Provenance
 from worker.jobs.from_schemas import Picture, camera_with_ignored_areas, pitch_of
 from worker.jobs.to_schemas import (
     PREVIEW_FRACTION,
@@ -26,11 +29,6 @@ from worker.jobs.to_schemas import (
     progress_to_schema,
     provenance_of,
 )
-
-if TYPE_CHECKING:
-    from service.schemas.options import FieldOptions, Options
-    from service.schemas.venue import Camera as VenueCamera
-    from service.schemas.venue import Venue
 
 Frames = Mapping[str, Sequence[Picture]]
 

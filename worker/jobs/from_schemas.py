@@ -1,17 +1,21 @@
-"""Conversion of the wire's models, and of documents of `worker.jobs.documents`, to the types of the engine."""
+"""Conversion of the wire's models to the types of the engine."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from fields.plans import other_shapes, plan_of, size_of
+from service.schemas import geometry, view
+from service.schemas.field import FieldOfPlay
+from service.schemas.geometry import Intrinsics, PosedCamera
+from service.schemas.job import JobError
 from service.schemas.names import problem_uri
+from service.schemas.problems import PROBLEM_TYPES
 from worker.calibration.geometry.camera import Camera, Pose
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.ignored_areas import Ignored
@@ -19,12 +23,6 @@ from worker.calibration.geometry.lens import Lens
 from worker.calibration.geometry.lens_models import LENSES
 from worker.calibration.stitching.photometry import Light
 from worker.calibration.stitching.views import ViewChoice
-from worker.jobs.documents import JobError
-
-if TYPE_CHECKING:
-    from service.schemas import geometry, view
-    from service.schemas.field import FieldOfPlay
-    from service.schemas.geometry import Intrinsics, PosedCamera
 
 Picture = NDArray[np.uint8]
 JPEG_QUALITY = 90
@@ -40,9 +38,6 @@ class JobFailedError(Exception):
     @property
     def error(self) -> JobError:
         """The error of the job, for the wire."""
-        # Nearly all jobs end without.
-        from service.schemas.problems import PROBLEM_TYPES
-
         return JobError(
             type=problem_uri(self.kind),
             title=PROBLEM_TYPES[self.kind].title,

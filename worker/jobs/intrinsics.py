@@ -5,13 +5,13 @@ from collections.abc import Callable, Mapping
 from importlib.metadata import version
 
 from service.schemas import options as wire
+from service.schemas.job import Progress
 from service.schemas.options import IntrinsicsOptions
 from service.schemas.results import CoverageResult, IntrinsicsResult, LensTrial, PhotoResult
 from worker.calibration.onboarding.boards import Board, Charuco, find_board, other_size
 from worker.calibration.onboarding.lens_calibration import LensCalibration, Photo, UndeterminedLensError, calibrate_lens
 from worker.calibration.rendering.inspection import coverage_picture
 from worker.jobs.decoding import decode_image
-from worker.jobs.documents import Progress
 from worker.jobs.from_schemas import JobFailedError, Picture, encode_jpeg
 from worker.jobs.jpeg import DamagedPictureError
 from worker.jobs.to_schemas import Solution, finite_or_none, lens_to_schema, round_to_ms

@@ -11,6 +11,7 @@ from fields.landmarks import UnknownLandmark
 from service.schemas import geometry, results
 from service.schemas.field import FieldOfPlay
 from service.schemas.frame_sizes import other_size
+from service.schemas.job import Progress
 from service.schemas.options import ClickedPoint, LocateOptions
 from service.schemas.results import LocateResult, LocateSigma, PointResult
 from service.schemas.venue import Venue
@@ -24,7 +25,6 @@ from worker.calibration.onboarding.first_pose_verdict import FirstPose
 from worker.calibration.onboarding.freed_lens import LensGain
 from worker.calibration.rendering.inspection import clicks_picture
 from worker.jobs.decoding import decode_frame_of_any_size
-from worker.jobs.documents import Progress
 from worker.jobs.from_schemas import JobFailedError, Picture, encode_jpeg, lens_of, pitch_of
 from worker.jobs.to_schemas import Solution, finite_or_none, lens_to_schema, pose_to_schema, round_to_ms
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from service.schemas.lens_limits import LARGEST_COEFFICIENT, LARGEST_SIGMA, LEAST_SIGMA
 from service.schemas.lens_map import map_of
+from service.schemas.results import LensChange, Refined
 from worker.calibration.gate.quality import CameraResult
 from worker.calibration.geometry.camera import Array, Camera
 from worker.calibration.geometry.derivatives import POSE_NUMBERS
@@ -21,7 +22,6 @@ from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.lens import SIGMA_NAMES, Lens
 from worker.calibration.memory.camera_memory import CameraMemory
 from worker.calibration.refinement import uncertainty
-from worker.jobs.documents import LensChange, Refined
 from worker.jobs.to_schemas import lens_to_schema, pose_to_schema, sigma_to_schema
 
 

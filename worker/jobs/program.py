@@ -5,34 +5,30 @@ line of JSON for each step of progress and one for the end, a `worker.protocol.M
 line. It decodes what strangers sent, so it sees no database, no store and no settings: its parent reads and writes
 them.
 
-Nearly every job is a calibration near its stored poses, and begins this program anew. So a calibration loads what that
-needs and no models of the wire: its parent has checked the request, and checks the answer. Other kinds load the models.
+Its worker forks it from a process that has imported all kinds of jobs: `worker.fork_server`.
 """
 
-import json
 import logging
-import math
 import os
 import sys
-from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any, cast
+from collections.abc import Callable
+from typing import Any
 
 import cv2
-import numpy as np
 
 from service import child_process
+from service.schemas.check import CheckedFile
+from service.schemas.find import SoughtSite
+from service.schemas.job import Progress
 from service.schemas.names import OWN_QUEUES
+from service.schemas.options import FieldOptions, FindOptions, IntrinsicsOptions, LocateOptions, Options
+from service.schemas.venue import Venue
+from service.store.jobs.task import Task
 from worker.compute_resources import ComputeResources
-from worker.jobs.documents import Document, Progress, parse, parse_task
+from worker.jobs import calibration, check, field, find, intrinsics, locate
 from worker.jobs.from_schemas import JobFailedError
 from worker.jobs.to_schemas import Solution
-
-if TYPE_CHECKING:
-    from service.schemas.find import SoughtSite
-    from service.schemas.options import FindOptions, Options
-    from service.schemas.venue import Venue
-    from service.store.jobs.task import Task
+from worker.protocol import Files, JobRequest, Message
 
 BEHIND_THE_OTHERS = 10
 """Niceness: answers of the API and heartbeats of the worker on the same machine go before the computation."""
@@ -46,26 +42,25 @@ def main() -> None:
     os.nice(BEHIND_THE_OTHERS)
     parent = Parent()
     logging.basicConfig(handlers=[parent], format="%(message)s")
-    request, files = read_request(sys.stdin.buffer)
-    if OWN_QUEUES.get(request["task"]["kind"]) == "search":
+    request, files = JobRequest.read(sys.stdin.buffer)
+    if OWN_QUEUES.get(request.task.kind) == "search":
         os.nice(BEHIND_CALIBRATIONS)
-    means = ComputeResources(**request["means"] | {"model": Path(request["means"]["model"])})
     try:
-        solution = _compute(request["task"], files, means, lambda progress: parent.send({"progress": progress}))
+        solution = _compute(request.task, files, request.means, lambda step: parent.send(Message(progress=step)))
     except JobFailedError as failure:
-        parent.send({"error": failure.error})
+        parent.send(Message(error=failure.error))
         return
     except Exception as error:
         if not _is_lack_of_memory(error):
             raise
-        parent.send({"error": _without_memory().error})
+        parent.send(Message(error=_without_memory().error))
         return
-    last = {
-        "result": solution.result.model_dump(mode="json"),
-        "pictures": {name: len(picture) for name, picture in solution.pictures.items()},
-        "later": list(solution.later),
-        "memories": dict(solution.memories),
-    }
+    last = Message(
+        result=solution.result,
+        pictures={name: len(picture) for name, picture in solution.pictures.items()},
+        later=list(solution.later),
+        memories=dict(solution.memories),
+    )
     parent.send(last, *solution.pictures.values())
 
 
@@ -83,97 +78,33 @@ def _without_memory() -> JobFailedError:
     return JobFailedError("job-crashed", detail)
 
 
-def read_request(stream: IO[bytes]) -> tuple[Document, dict[str, list[bytes]]]:
-    """Read a request that `JobRequest.write` wrote, as a document, and its files."""
-    request = parse(stream.readline())
-    return request, {name: [stream.read(size) for size in several] for name, several in request["sizes"].items()}
-
-
-def _compute(
-    task: Document,
-    files: Mapping[str, Sequence[bytes]],
-    means: ComputeResources,
-    report: Callable[[Progress], None],
-) -> Solution[Any]:
-    """Compute a job by its kind; modules of the other kinds are not loaded."""
+def _compute(task: Task, files: Files, means: ComputeResources, report: Callable[[Progress], None]) -> Solution[Any]:
+    """Compute a job by its kind."""
     cv2.setNumThreads(means.threads)
-    if task["kind"] != "calibration":
-        return _compute_by_models(task, files, means, report)
-    from worker.jobs import calibration
-
-    given = parse_task(task)
-    nights = calibration.NightHistory(given.last_views, given.memories, given.anchors, given.taken_at)
-    return calibration.solve(cast("Venue", given.venue), files, cast("Options", given.options), means, report, nights)
-
-
-def _compute_by_models(
-    document: Document,
-    files: Mapping[str, Sequence[bytes]],
-    means: ComputeResources,
-    report: Callable[[Progress], None],
-) -> Solution[Any]:
-    """Compute a job of the kinds that are rarely asked for."""
-    from service.schemas.check import CheckedFile
-    from service.schemas.options import FieldOptions, FindOptions, IntrinsicsOptions, LocateOptions
-    from service.store.jobs.task import Task
-
-    task = Task.model_validate(document, extra="ignore")
     match task.options:
+        case Options() as options:
+            nights = calibration.NightHistory.of(task)
+            return calibration.solve(_venue_of(task), files, options, means, report, nights)
         case IntrinsicsOptions() as options:
-            from worker.jobs import intrinsics
-
             return intrinsics.solve({name: photo for name, (photo,) in files.items()}, options, report)
         case LocateOptions() as options:
-            from worker.jobs import locate
-
-            assert task.venue is not None
             ((camera, frames),) = files.items()
-            return locate.solve(task.venue, camera, options, next(iter(frames), None), report)
+            return locate.solve(_venue_of(task), camera, options, next(iter(frames), None), report)
         case FieldOptions() as options:
-            from worker.jobs import field
-
-            assert task.venue is not None
-            return field.solve(task.venue, files, options, means, report)
+            return field.solve(_venue_of(task), files, options, means, report)
         case FindOptions() as options:
-            from worker.jobs import find
-
-            return find.solve(_site_of(task, options, files), files, options.seed or 0, means, report)
+            # The site that was sent, or else the stored venue.
+            site = task.site or SoughtSite.of(_venue_of(task), options, files)
+            return find.solve(site, files, options.seed or 0, means, report)
         case CheckedFile() as given:
-            from worker.jobs import check
-
             return check.solve(given, files, means, report)
         case _:
             raise AssertionError(task.kind)
 
 
-def _site_of(task: "Task", options: "FindOptions", files: Mapping[str, Sequence[bytes]]) -> "SoughtSite":
-    """Return the site whose cameras are to be found: the one that was sent, or the stored venue."""
-    from service.schemas.find import SoughtSite
-
-    if task.site is not None:
-        return task.site
+def _venue_of(task: Task) -> Venue:
     assert task.venue is not None
-    return SoughtSite.of(task.venue, options, files)
-
-
-def encode(message: Mapping[str, Any]) -> bytes:
-    """The line of JSON of a message."""
-    return json.dumps(_plain(message), ensure_ascii=False).encode()
-
-
-def _plain(value: Any) -> Any:
-    """Return a value with plain numbers for NumPy's, and None for numbers that JSON lacks."""
-    match value:
-        case dict():
-            return {name: _plain(one) for name, one in value.items()}
-        case list() | tuple():
-            return [_plain(one) for one in value]
-        case float():
-            return float(value) if math.isfinite(value) else None
-        case np.generic():
-            return _plain(value.item())
-        case _:
-            return value
+    return task.venue
 
 
 class Parent(logging.Handler):
@@ -187,15 +118,15 @@ class Parent(logging.Handler):
         self._messages = os.fdopen(os.dup(1), "wb")
         os.dup2(2, 1)
 
-    def send(self, message: Mapping[str, Any], *files: bytes) -> None:
-        """Write a `worker.protocol.Message` as a line of JSON, and the files behind it."""
-        self._messages.write(encode(message) + b"\n")
+    def send(self, message: Message, *files: bytes) -> None:
+        """Write a message as a line of JSON, and the files behind it."""
+        self._messages.write(message.model_dump_json().encode() + b"\n")
         self._messages.writelines(files)
         self._messages.flush()
 
     def emit(self, record: logging.LogRecord) -> None:
         """Send a line of the log to the parent, which adds the job."""
-        self.send({"warning": self.format(record)})
+        self.send(Message(warning=self.format(record)))
 
 
 if __name__ == "__main__":

@@ -1,14 +1,30 @@
-"""Conversion of the engine's answers to documents of the wire, and other parts that the kinds of jobs share."""
+"""Conversion of the engine's answers to models of the wire, and other parts that the kinds of jobs share."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
 from math import isfinite, isnan
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
+from service.schemas import geometry
+from service.schemas.field import FieldOfPlay
+from service.schemas.geometry import Intrinsics, Moved
+from service.schemas.job import Progress
 from service.schemas.lens_limits import LARGEST_SIGMA, LEAST_SIGMA
 from service.schemas.names import refusal_uri
+from service.schemas.results import (
+    CameraResult,
+    CrossCheck,
+    MarkingResult,
+    PairResult,
+    Proposal,
+    Provenance,
+    SeamPlace,
+    Sigma,
+    View,
+)
+from service.schemas.trend import Anchor, Displacement
 from worker.calibration import records
 from worker.calibration.detection.segmentation import ProviderMissing, Segmenter
 from worker.calibration.detection.view_condition import ViewCondition
@@ -23,27 +39,7 @@ from worker.calibration.geometry.lens import Lens
 from worker.calibration.refinement import cross_check, uncertainty
 from worker.calibration.stitching.photometry import Light
 from worker.compute_resources import ComputeResources
-from worker.jobs import documents
-from worker.jobs.documents import (
-    CameraResult,
-    CrossCheck,
-    Displacement,
-    Intrinsics,
-    MarkingResult,
-    Moved,
-    PairResult,
-    Progress,
-    Proposal,
-    Provenance,
-    SeamPlace,
-    Sigma,
-    View,
-)
 from worker.jobs.from_schemas import JobFailedError, camera_of
-
-if TYPE_CHECKING:
-    from service.schemas.field import FieldOfPlay
-    from service.schemas.trend import Anchor
 
 PROVIDERS = {"cpu": "CPUExecutionProvider", "cuda": "CUDAExecutionProvider", "openvino": "OpenVINOExecutionProvider"}
 # The engine's report ends with the refinement; what is left is drawing.
@@ -57,7 +53,6 @@ R = TypeVar("R", covariant=True)
 class Solution(Generic[R]):
     """A result and the files of its pictures by the names that `service.store.jobs.files.picture_file` knows.
 
-    The result of a calibration is a document, those of other kinds are models of the wire.
     `later`: names of pictures that can be drawn when somebody looks; `memories`: of the accepted cameras, by camera.
     """
 
@@ -92,16 +87,16 @@ def lens_to_schema(lens: Lens) -> Intrinsics:
     )
 
 
-def light_to_schema(light: Light) -> documents.Light:
+def light_to_schema(light: Light) -> geometry.Light:
     """Return a camera's photometric correction for the wire, its colours from red to blue."""
-    return documents.Light(
+    return geometry.Light(
         gain=[*reversed(light.gain)], contrast=light.contrast, falloff=light.falloff, reach=light.reach
     )
 
 
-def pose_to_schema(pose: Pose) -> documents.Pose:
+def pose_to_schema(pose: Pose) -> geometry.Pose:
     """Return a pose of the engine for the wire."""
-    return documents.Pose(
+    return geometry.Pose(
         rotation=pose.rotation.tolist(), position=pose.position.tolist(), translation=pose.translation.tolist()
     )
 
@@ -111,7 +106,7 @@ def ridge_to_schema(pitch: Field) -> list[list[float]] | None:
     return None if pitch.ridge is None else pitch.ridge.round(MILLIMETRE).tolist()
 
 
-def field_to_schema(given: "FieldOfPlay", pitch: Field) -> "FieldOfPlay":
+def field_to_schema(given: FieldOfPlay, pitch: Field) -> FieldOfPlay:
     """Return a field of the wire with the measures of a fitted pitch in millimetres, finer than any of its sigmas."""
     size = {"length_m": round(pitch.length, MILLIMETRE), "width_m": round(pitch.width, MILLIMETRE)}
     return given.changed({**size, "ridge": ridge_to_schema(pitch)})
@@ -198,7 +193,7 @@ def _proposal(found: quality.CameraResult) -> Proposal | None:
     )
 
 
-def displacement_to_schema(pitch: Field, found: quality.CameraResult, anchor: "Anchor | None") -> Displacement | None:
+def displacement_to_schema(pitch: Field, found: quality.CameraResult, anchor: Anchor | None) -> Displacement | None:
     """Return the displacement of a camera from its anchor, or from itself without one; None if it is unknown."""
     reference = found.camera if anchor is None else camera_of(anchor.posed)
     moved = measure_displacement(pitch, reference, found)

@@ -8,10 +8,10 @@ from service.schemas.options import Options
 from service.schemas.venue import VenueIn
 from service.settings import MODEL_BESIDE_THE_CODE
 from testbed import demo_pair
-from testbed.by_models import solve
 from tests.architecture import ROOT
 from worker.calibration.records import NOT_RECORDED
 from worker.compute_resources import ComputeResources
+from worker.jobs.calibration import solve
 from worker.jobs.debugging import DebugRecorder
 
 pytestmark = pytest.mark.slow

@@ -73,7 +73,7 @@ def test_a_frame_that_is_damaged_fails_by_the_name_of_its_camera():
     damaged = damage(cv2.imencode(".jpg", SCENE)[1].tobytes(), "flipped", np.random.default_rng(1))
     with pytest.raises(JobFailedError, match="camera left is of no use: it is damaged") as failure:
         decode_frame("left", SCENE.shape[1::-1], damaged)
-    assert (failure.value.error["type"], failure.value.error["camera"]) == ("/problems/broken-image", "left")
+    assert (failure.value.error.type, failure.value.error.camera) == ("/problems/broken-image", "left")
 
 
 def test_blocks_that_are_too_bright_from_one_on_are_a_damage():

@@ -35,4 +35,4 @@ def refusal(tmp_path, template, length_m, width_m):
     [("football", 105, 68), ("hockey", 91.4, 55), ("handball", 40, 20), ("handball", 38, 18), ("rugby-union", 100, 70)],
 )
 def test_a_field_of_any_sport_can_be_fitted(tmp_path, template, length_m, width_m):
-    assert refusal(tmp_path, template, length_m, width_m)["type"] == "/problems/model-missing"
+    assert refusal(tmp_path, template, length_m, width_m).type == "/problems/model-missing"

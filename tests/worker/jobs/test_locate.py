@@ -54,7 +54,7 @@ ONE, OTHERS = lens(1250), {"another focal length": lens(1310), "twice the size":
 def test_points_exchanged_between_cameras_of_other_lenses_are_refused_as_such(other):
     found = located({"left": ONE, "right": other}, {"left": clicked(other, RIGHT, 1), "right": clicked(ONE, LEFT, 2)})
     for end in found.values():
-        why = end.error["detail"] if isinstance(end, JobFailedError) else end.rejected_because
+        why = end.error.detail if isinstance(end, JobFailedError) else end.rejected_because
         assert "points of left fit the lens of right (" in why
         assert "the points of the two cameras are exchanged, or else their lenses" in why
         assert isinstance(end, JobFailedError) or not end.accepted
@@ -80,7 +80,7 @@ def test_a_lens_that_was_measured_badly_is_no_exchange():
 
 
 def stored():
-    return {name: geometry.Pose(**pose_to_schema(pose)) for name, pose in (("left", LEFT), ("right", RIGHT))}
+    return {name: pose_to_schema(pose) for name, pose in (("left", LEFT), ("right", RIGHT))}
 
 
 def test_points_of_a_camera_with_the_same_lens_are_told_by_the_stored_poses():

@@ -49,20 +49,20 @@ def test_a_refined_camera_is_told_with_its_covariance_and_with_what_differs(foun
     there = with_lens_changed(CAMERA, np.array([2.0, 0.5, 0.0, 0.0, 1e-3, 0.0]))
     covariance = np.diag([1e-8] * 3 + [1e-4] * 3 + [4.0, 1.0, 1.0, 1e-8, 1e-6, 1e-6])
     told = refined_to_schema(PITCH, replace(found, refined=PoseAndLens(there, covariance)))
-    assert told["longer"] == pytest.approx(0.001)
-    assert told["intrinsics"]["matrix"][0] == pytest.approx([2002.0, 0.0, 1920.5])
-    assert told["intrinsics"]["distortion"] == [1e-3, 0, 0, 0]
-    assert told["intrinsics"]["sigma"] == pytest.approx(
+    assert told.longer == pytest.approx(0.001)
+    assert told.intrinsics.matrix[0] == pytest.approx([2002.0, 0.0, 1920.5])
+    assert told.intrinsics.distortion == [1e-3, 0, 0, 0]
+    assert told.intrinsics.sigma == pytest.approx(
         {"fx": 2.0, "cx": 1.0, "cy": 1.0, "aspect": 1e-4, "k1": 1e-3, "k2": 1e-3}
     )
-    assert told["covariance"] == covariance.tolist()
-    assert told["sigma"]["position_m"] == pytest.approx(3**0.5 * 0.01)
-    assert 0.01 < told["differs_m"] < 1.0
+    assert told.covariance == covariance.tolist()
+    assert told.sigma.position_m == pytest.approx(3**0.5 * 0.01)
+    assert 0.01 < told.differs_m < 1.0
 
 
 def test_a_covariance_that_is_not_determined_is_none(found):
     told = refined_to_schema(PITCH, replace(found, refined=PoseAndLens(CAMERA, np.diag([np.inf] * 12))))
-    assert (told["covariance"], told["sigma"], told["intrinsics"]["sigma"]) == (None, None, None)
+    assert (told.covariance, told.sigma, told.intrinsics.sigma) == (None, None, None)
 
 
 @pytest.mark.parametrize("change", [[-3000.0, 0, 0, 0, 0, 0], [0, 0, 0, 0, 2000.0, 0], [np.nan, 0, 0, 0, 0, 0]])
@@ -100,7 +100,7 @@ def test_a_change_of_the_lens_is_put_into_words_once_it_is_no_chance(change, wor
 
 def test_a_change_of_the_lens_is_told_in_numbers_whatever_it_is(found):
     told = lens_change_to_schema(replace(found, lens_change=LensChange(NOVEMBER, 0.0029, 0.001)), TONIGHT)
-    assert (told["longer"], told["sigma"], told["since"], told["words"]) == (0.0029, 0.001, NOVEMBER.isoformat(), None)
+    assert (told.longer, told.sigma, told.since, told.words) == (0.0029, 0.001, NOVEMBER, None)
 
 
 def test_a_memory_that_another_release_wrote_is_left_out():
