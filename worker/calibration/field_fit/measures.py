@@ -185,7 +185,7 @@ def _with_known(
             pitch = parameter.write(pitch, parameter.read(fitted))
             still_free.append(parameter)
     # Near the truth now, its broken lines can have the dashes that are painted.
-    pitch = pitch.dashed_anew()
+    pitch = pitch.drawn_anew()
     return (pitch.with_ridge_length(ridge.value) if ridge.known else pitch), still_free
 
 

@@ -103,7 +103,7 @@ def _fitted(
     """Return the estimate of everything else for a field, and the weighted residuals of the lines there."""
     estimate = Estimate.initial(pitch, cameras, unknowns)
     for _ in range(4):
-        unknowns = unknowns.around(estimate.pitch, estimate.lines)
+        unknowns = unknowns.around(estimate.pitch)
         estimate = gauss_newton_step(estimate, cameras, measured, unknowns, tukey_weights).to
     return estimate, weigh_rows(estimate.rows(measured, unknowns), estimate.heights, unknowns, tukey_weights)
 

@@ -79,9 +79,9 @@ class LinePoints:
 class Field:
     """A field of a sport, a football pitch unless said; `measures`: what else its template leaves open, in metres.
 
-    `ridge`: the paper's p and p', (2, 3), same y and same z; None = flat. `dashed`: the size whose dashes its broken
-    lines have, as many and stretched with them; None = its own. `others`: what else is painted there, of no use.
-    `sigma`: how well numbers of it are known, m, by the names of `parameters.field_parameters`.
+    `ridge`: the paper's p and p', (2, 3), same y and same z; None = flat. `stretched_from`: the field whose dashes its
+    broken lines have, and whose points all its lines, as many and stretched with them. `others`: what else is painted
+    there, of no use. `sigma`: how well numbers of it are known, m, by the names of `parameters.field_parameters`.
     """
 
     length: float
@@ -90,7 +90,7 @@ class Field:
     ridge: Array | None = None
     template: Template = FOOTBALL
     measures: Mapping[str, float] = field(default_factory=dict)
-    dashed: Mapping[str, float] | None = None
+    stretched_from: "Field | None" = None
     others: Sequence[Shape] = ()
     sigma: Mapping[str, float] = field(default_factory=dict)
 
@@ -100,12 +100,12 @@ class Field:
             self,
             length=self.length if length is None else length,
             width=self.width if width is None else width,
-            dashed=self._size if self.dashed is None else self.dashed,
+            stretched_from=self._unstretched,
         )
 
-    def dashed_anew(self) -> "Field":
-        """Return the field with as many dashes as fit on its lines."""
-        return replace(self, dashed=None)
+    def drawn_anew(self) -> "Field":
+        """Return the field with as many dashes and points as fit on its lines."""
+        return replace(self, stretched_from=None)
 
     def flat(self) -> "Field":
         """Return the field without a ridge, on a plane."""
@@ -169,11 +169,19 @@ class Field:
 
     @cached_property
     def _markings(self) -> list[Marking]:
-        return [_marking(shape) for shape in self.template.markings(self._size, self.dashed)]
+        return [_marking(shape) for shape in self.template.markings(self._size, self._unstretched._size)]
 
     @property
     def _size(self) -> dict[str, float]:
         return {"length": self.length, "width": self.width, "line": self.line_width, **self.measures}
+
+    @property
+    def _unstretched(self) -> "Field":
+        return self.stretched_from or self
+
+    @cached_property
+    def _marks(self) -> list[int]:
+        return marks_with_free_ends(self.markings())
 
     def whole_names(self) -> list[str]:
         """Return the name of what each marking is a part of: one name for all dashes of a broken line."""
@@ -190,9 +198,7 @@ class Field:
     def line_points(self, spacing: float = MEASURED_SPACING_M) -> LinePoints:
         """Return points every `spacing` metres on the centres of all markings, on the surface, with directions."""
         if spacing not in self._drawn:
-            markings = self.markings()
-            counts = [fitting(marking.centre, spacing) for marking in markings]
-            self._drawn[spacing] = self._line_points(markings, counts, spacing)
+            self._drawn[spacing] = self._line_points(self.markings(), self._point_counts(spacing), spacing)
         return self._drawn[spacing]
 
     @cached_property
@@ -202,9 +208,11 @@ class Field:
         The sides of a mark say where it is across itself, and its ends where it is along itself. Marks are those with
         two ends beside which there is no other paint: of hash marks, dashes of rugby, the 7-metre line of handball.
         """
-        markings = self.markings()
-        counts = [fitting(marking.centre, MEASURED_SPACING_M) for marking in markings]
-        return self._line_points(markings, counts, MEASURED_SPACING_M, marks_with_free_ends(markings))
+        counts = self._point_counts(MEASURED_SPACING_M)
+        return self._line_points(self.markings(), counts, MEASURED_SPACING_M, self._unstretched._marks)
+
+    def _point_counts(self, spacing: float) -> list[int]:
+        return [fitting(marking.centre, spacing) for marking in self._unstretched.markings()]
 
     @cached_property
     def _drawn(self) -> dict[float, LinePoints]:
@@ -217,12 +225,6 @@ class Field:
         if not others:
             return None
         return self._line_points(others, [fitting(marking.centre, spacing) for marking in others], spacing)
-
-    def same_line_points(self, others: LinePoints) -> LinePoints:
-        """Return the points that correspond to those of the field before `resized`: as many on each marking."""
-        counts: list[int] = np.bincount(others.marking[~others.end_to_end]).tolist()
-        marks: list[int] = others.marking[others.end_to_end].tolist()
-        return self._line_points(self.markings(), counts, others.spacing, marks)
 
     def _line_points(
         self, markings: Sequence[Marking], counts: Sequence[int], spacing: float, marks: Sequence[int] = ()

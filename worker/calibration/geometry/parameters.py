@@ -9,7 +9,7 @@ from typing import Self
 import numpy as np
 
 from worker.calibration.geometry.camera import Array, Camera
-from worker.calibration.geometry.field import Field, LinePoints
+from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.lens import LENS_PARAMETERS, Lens
 
 BOARD_FOCAL, BOARD_ASPECT, BOARD_RADIAL = 3e-4, 2e-4, 5e-4
@@ -53,17 +53,17 @@ class FieldParameter:
     name: str
     expected: float
     shift: Array = field(default_factory=lambda: np.empty((0, 3)), kw_only=True)
-    lines: LinePoints | None = field(default=None, kw_only=True)
+    pitch: Field | None = field(default=None, kw_only=True)
 
-    def around(self, pitch: Field, lines: LinePoints) -> Self:
-        """Return this parameter with its `shift` for `lines` of a pitch that may have been changed since."""
-        return self if lines is self.lines else replace(self, shift=self._shift_of(pitch, lines), lines=lines)
+    def around(self, pitch: Field) -> Self:
+        """Return this parameter with its `shift` for the lines of a pitch that may have been changed since."""
+        return self if pitch is self.pitch else replace(self, shift=self._shift_of(pitch), pitch=pitch)
 
     def applied(self, cameras: Sequence[Camera], pitch: Field, by: float) -> tuple[list[Camera], Field]:
         """Return cameras and field with this parameter changed; only measures can be solved for."""
         raise NotImplementedError(self.name)
 
-    def _shift_of(self, pitch: Field, lines: LinePoints) -> Array:
+    def _shift_of(self, pitch: Field) -> Array:
         raise NotImplementedError(self.name)
 
 
@@ -78,10 +78,10 @@ class FieldMeasure(FieldParameter):
         """Return cameras and field with this measure changed, as far as it can be."""
         return list(cameras), self.write(pitch, self.read(pitch) + by)
 
-    def _shift_of(self, pitch: Field, lines: LinePoints) -> Array:
+    def _shift_of(self, pitch: Field) -> Array:
         field_step_m = 1e-3
         ahead, behind = (
-            self.write(pitch, self.read(pitch) + step).same_line_points(lines).position
+            self.write(pitch, self.read(pitch) + step).measured_points.position
             for step in (field_step_m, -field_step_m)
         )
         return np.asarray((ahead - behind) / (2 * field_step_m), dtype=float)
@@ -94,8 +94,8 @@ class FieldSkew(FieldParameter):
     No venue can have one: it is named, and explains what else would bend the lenses.
     """
 
-    def _shift_of(self, pitch: Field, lines: LinePoints) -> Array:
-        return lines.position[:, 1:2] / (pitch.width / 2) * [1.0, 0.0, 0.0]
+    def _shift_of(self, pitch: Field) -> Array:
+        return pitch.measured_points.position[:, 1:2] / (pitch.width / 2) * [1.0, 0.0, 0.0]
 
 
 Parameter = LensParameter | FieldParameter
@@ -212,7 +212,7 @@ def field_measures(pitch: Field) -> list[FieldMeasure]:
 def field_parameters(pitch: Field) -> list[FieldParameter]:
     """Return the parameters of a field that may be wrong: its measures and its skew."""
     skew = FieldSkew("skew_m", _known(pitch)["skew_m"])
-    return [*field_measures(pitch), skew.around(pitch, pitch.measured_points)]
+    return [*field_measures(pitch), skew.around(pitch)]
 
 
 def _known(pitch: Field) -> dict[str, float]:
@@ -273,15 +273,15 @@ def _ridge_height(pitch: Field, expected: float) -> FieldMeasure:
     measure = FieldMeasure(
         "ridge_height_m", expected, lambda one: one.ridge_height, lambda one, now: one.raised(now - one.ridge_height)
     )
-    return measure.around(pitch, pitch.measured_points)
+    return measure.around(pitch)
 
 
 def _length(pitch: Field, expected: float) -> FieldMeasure:
     """Return the length of the field; its ridge keeps its own."""
     measure = FieldMeasure("length_m", expected, lambda one: one.length, lambda one, now: one.resized(length=now))
-    return measure.around(pitch, pitch.measured_points)
+    return measure.around(pitch)
 
 
 def _width(pitch: Field, expected: float) -> FieldMeasure:
     measure = FieldMeasure("width_m", expected, lambda one: one.width, lambda one, now: one.resized(width=now))
-    return measure.around(pitch, pitch.measured_points)
+    return measure.around(pitch)

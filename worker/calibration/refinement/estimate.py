@@ -30,12 +30,10 @@ TURN_M = 30.0
 class Estimate:
     """Current cameras and field of the refinement, parameter `values` (E,) in them, and `heights` (K,) of the ground.
 
-    `lines`: the pitch's line points, as many as it had in the beginning; `uneven_m`: a standard deviation of the
-    heights.
+    `uneven_m`: a standard deviation of the heights.
     """
 
     pitch: Field
-    lines: LinePoints
     cameras: list[Camera]
     values: Array
     heights: Array
@@ -46,12 +44,16 @@ class Estimate:
         """Return the estimate before any step."""
         return cls(
             pitch,
-            pitch.measured_points,
             list(cameras),
             np.zeros(len(unknowns.parameters)),
             np.zeros(len(unknowns.ground)),
             unknowns.ground.usual_m,
         )
+
+    @property
+    def lines(self) -> LinePoints:
+        """Points of the field's lines that are measured, on its surface."""
+        return self.pitch.measured_points
 
     def on_ground(self, unknowns: Unknowns) -> LinePoints:
         """Return the line points of the field, on its ground."""
@@ -64,12 +66,11 @@ class Estimate:
         pitch, cameras = self.pitch, self.cameras
         for parameter, by in zip(unknowns.parameters, values.tolist(), strict=True):
             cameras, pitch = parameter.applied(cameras, pitch, by)
-        lines = self.lines if pitch is self.pitch else pitch.same_line_points(self.lines)
         cameras = [
             moved(camera, change) for camera, change in zip(cameras, poses.reshape(-1, POSE_NUMBERS), strict=True)
         ]
         values, heights = self.values + values, self.heights + heights
-        return replace(self, pitch=pitch, lines=lines, cameras=cameras, values=values, heights=heights)
+        return replace(self, pitch=pitch, cameras=cameras, values=values, heights=heights)
 
     def largest_move_m(self, other: "Estimate") -> float:
         """Return the largest move (m) of a view between two estimates; turns as shifts at `TURN_M`."""

@@ -316,7 +316,7 @@ def unknowns_of(estimate: Estimate, memories: Sequence[CameraMemory | None], sol
         [*solved.parameters, *(p for p in suspects if (getattr(p, "camera", None), p.name) not in known), *heats],
         solved.ground,
         [(owner, _heat_number(views, view)) for view, owner in enumerate(owner_of)],
-    ).around(estimate.pitch, estimate.lines)
+    ).around(estimate.pitch)
 
 
 def _heat_number(views: int, view: int) -> int:

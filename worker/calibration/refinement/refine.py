@@ -166,7 +166,7 @@ class _Refiner:
 
     def around(self, estimate: Estimate) -> "_Refiner":
         """Return the refinement for the field of an estimate, which steps may have changed."""
-        return replace(self, unknowns=self.unknowns.around(estimate.pitch, estimate.lines))
+        return replace(self, unknowns=self.unknowns.around(estimate.pitch))
 
     def catch(self, estimate: Estimate, searches_px: Sequence[float]) -> Estimate:
         """Return the estimate after rounds with a narrower and narrower search, which catch the lines."""
@@ -375,7 +375,7 @@ def _moves_m(
     if measure is None:
         return {}
     _, pitch = measure.applied(estimate.cameras, estimate.pitch, wrong.value)
-    there = replace(estimate, pitch=pitch, lines=pitch.same_line_points(estimate.lines))
+    there = replace(estimate, pitch=pitch)
     refiner = refiner.around(there)
     there = refiner.down_huber(there, measured)
     for _ in range(MOST_STEPS):

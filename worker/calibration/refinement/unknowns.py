@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from worker.calibration.geometry.derivatives import POSE_NUMBERS
-from worker.calibration.geometry.field import Field, LinePoints
+from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.ground import Ground
 from worker.calibration.geometry.parameters import FieldParameter, LensParameter, Parameter
 
@@ -41,9 +41,9 @@ class Unknowns:
             if not isinstance(parameter, LensParameter) or parameter.camera in lenses
         ]
 
-    def around(self, pitch: Field, lines: LinePoints) -> "Unknowns":
+    def around(self, pitch: Field) -> "Unknowns":
         """Return the unknowns for a field that has been changed since."""
-        parameters = [p.around(pitch, lines) if isinstance(p, FieldParameter) else p for p in self.parameters]
+        parameters = [p.around(pitch) if isinstance(p, FieldParameter) else p for p in self.parameters]
         return replace(self, parameters=parameters)
 
     def __len__(self) -> int:

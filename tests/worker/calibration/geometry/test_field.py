@@ -95,11 +95,12 @@ def test_resampled_points_are_evenly_spaced(spacing, corners):
 
 
 def test_points_stay_the_same_points_on_a_pitch_of_other_measures():
-    longer = Field(109.3, 64.0, 0.12, CROWNED.ridge)
+    longer = CROWNED.resized(length=109.3, width=64.0)
     lines = CROWNED.line_points()
-    same = longer.same_line_points(lines)
+    same = longer.line_points()
     assert (same.marking == lines.marking).all()
-    assert len(longer.line_points()) != len(lines)
+    assert len(longer.drawn_anew().line_points()) != len(lines)
+    assert len(longer.measured_points) == len(CROWNED.measured_points)
     touchline = lines.marking == 0
     along = lines.position[touchline, 0] / (CROWNED.length - 0.12)
     assert same.position[touchline, 0] / (longer.length - 0.12) == pytest.approx(along)
@@ -134,7 +135,7 @@ def test_lines_that_end_at_other_lines_have_no_free_ends(sport):
 
 def test_a_field_of_another_size_has_the_same_marks_with_free_ends():
     lines = sports.field("rugby-union").measured_points
-    same = sports.field("rugby-union").resized(width=69.0).same_line_points(lines)
+    same = sports.field("rugby-union").resized(width=69.0).measured_points
     np.testing.assert_array_equal(same.marking, lines.marking)
     np.testing.assert_array_equal(same.end_to_end, lines.end_to_end)
 
@@ -168,7 +169,7 @@ def test_a_resized_field_has_the_same_dashes_where_its_broken_lines_are_now(spor
     wider = nominal.resized(width=usual[1] + by).resized(length=usual[0] + by)
     assert [marking.name for marking in wider.markings()] == [marking.name for marking in nominal.markings()]
     lines = nominal.line_points(0.1)
-    assert (wider.same_line_points(lines).marking == lines.marking).all()
+    assert (wider.line_points(0.1).marking == lines.marking).all()
     if sport == "handball":
         dashes = [marking for marking in wider.markings() if "left free-throw line, far" in marking.name]
         ends = np.concatenate([dash.centre for dash in dashes])
@@ -177,16 +178,15 @@ def test_a_resized_field_has_the_same_dashes_where_its_broken_lines_are_now(spor
         assert ends[:, 1].max() < wider.width / 2
 
 
-def test_a_field_dashed_anew_has_whole_dashes_again():
+def test_a_field_drawn_anew_has_whole_dashes_again():
     wider = Field(40, 20, 0.05, template=load("handball")).resized(width=19.2)
     anew = Field(40, 19.2, 0.05, template=load("handball"))
     assert len(wider.markings()) > len(anew.markings())
-    assert len(wider.dashed_anew().markings()) == len(anew.markings())
+    assert len(wider.drawn_anew().markings()) == len(anew.markings())
 
 
 def test_the_points_of_broken_lines_move_smoothly_with_the_width():
     nominal = Field(40, 20, 0.05, template=load("handball"))
-    before = nominal.line_points()
-    steps = [nominal.resized(width=20 + by).same_line_points(before).position for by in (0.0, 0.01, 0.02)]
+    steps = [nominal.resized(width=20 + by).line_points().position for by in (0.0, 0.01, 0.02)]
     np.testing.assert_allclose(steps[1] - steps[0], steps[2] - steps[1], atol=2e-4)
     assert np.abs(steps[1] - steps[0]).max() < 0.03

@@ -35,7 +35,7 @@ def test_the_offsets_change_with_lens_and_field_as_the_rows_say(of):
 
     def offset(parameter, by):
         (there,), pitch = parameter.applied([one], CROWNED, by)
-        position = pitch.same_line_points(lines).position
+        position = pitch.measured_points.position
         return rows.measured.offset(there, position[rows.point])
 
     for column, parameter in enumerate(parameters, POSE_NUMBERS):

@@ -32,13 +32,13 @@ def found_on(displaced, pitch=PITCH, real=HALF):
 
 
 def skewed(by_m):
-    return lambda lines: by_m * FieldSkew("skew_m", 1.0).around(PITCH, lines).shift
+    return lambda lines: by_m * FieldSkew("skew_m", 1.0).around(PITCH).shift
 
 
 def longer(by_m):
     def displaced(lines):
         there = PITCH.resized(length=PITCH.length + by_m)
-        return there.same_line_points(lines).position - lines.position
+        return there.measured_points.position - lines.position
 
     return displaced
 
