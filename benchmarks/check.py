@@ -39,9 +39,11 @@ from service.schemas.geometry import Intrinsics, Pose
 from service.schemas.venue import VenueIn
 from testbed import real_pair
 from testbed.spoiled_calibrations import spoiled_ways
-from worker.calibration.geometry.camera import Camera
+from worker.calibration.checking.check import good_within_px
+from worker.calibration.geometry.camera import Camera, inside
 from worker.compute_resources import ComputeResources
 from worker.jobs.check import solve
+from worker.jobs.from_schemas import camera_of, pitch_of
 
 THREADS = 2
 DEMO = Path(__file__).parents[1] / "demo"
@@ -153,8 +155,15 @@ def _remembered(rows: Rows, view: View, way: str) -> dict:
 
 
 def _changes(view: View, way: str) -> bool:
-    """True unless a camera has nothing that could be spoiled in a way, as one without k3, p1 and p2."""
-    return _spoiled(view, way) != view.camera
+    """True unless a camera that is spoiled in a way puts the markings where it did: then it is good.
+
+    One without k3, p1 and p2 has no coefficients to exchange, and a lens may fold where no marking is.
+    """
+    right, spoiled = camera_of(view.camera), camera_of(_spoiled(view, way))
+    lines = pitch_of(view.field).line_points().position
+    seen = right.project(lines)
+    shift = np.linalg.norm(spoiled.project(lines) - seen, axis=1)[inside(seen, right.intrinsics.size)]
+    return not shift.mean() <= good_within_px(right)
 
 
 def _spoiled(view: View, way: str) -> CheckedCamera:

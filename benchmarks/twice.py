@@ -62,7 +62,7 @@ class Mistake:
     def displaced(self, lines: LinePoints) -> np.ndarray:
         """Return the real places of the line points (N, 3) of `PITCH`."""
         there = PITCH.resized(length=PITCH.length * (1 + self.length), width=PITCH.width * (1 + self.width))
-        x, y, z = there.same_line_points(lines).position.T
+        x, y, z = there.line_points(lines.spacing).position.T
         return np.stack([x + self.skew_m * y / (PITCH.width / 2), y, z], axis=1)
 
 

@@ -5,16 +5,20 @@ from typing import Literal
 
 import numpy as np
 
+from worker.calibration.checking.changes import Change, fewest_changes
 from worker.calibration.checking.check import CheckedCamera, good_within_px
 from worker.calibration.checking.readings import Cause
 from worker.calibration.gate.displacement import measure_displacement
 from worker.calibration.gate.quality import CameraResult, Moved
-from worker.calibration.geometry.camera import Array, Camera, Pose
+from worker.calibration.geometry.camera import Camera
 from worker.calibration.robust import SURE
 
 Grade = Literal["good", "drifted", "wrong", "cannot-tell"]
-Change = Literal["turned", "moved", "zoomed", "other-lens", "other-place"]
-CauseOfGrade = Cause | Change | Literal["other-resolution", "distortion-order", "folds", "unexplained", "no-pose"]
+CauseOfGrade = (
+    Cause
+    | Change
+    | Literal["other-lens", "other-place", "other-resolution", "distortion-order", "folds", "unexplained", "no-pose"]
+)
 
 
 @dataclass(frozen=True)
@@ -63,7 +67,9 @@ def grade(checked: CheckedCamera, lens_folds: str | None) -> GradedCamera:
     since: list[tuple[CauseOfGrade, str]] = []
     if difference.pixels > tolerance:
         written += folds
-        since += _changes(checked, found, tolerance)
+        # A lens that folds is wrong, whatever else is.
+        meant = checked.meant if lens_folds is None else checked.meant.with_lens(found.camera.intrinsics)
+        since += _changes(checked, meant, found.camera, tolerance)
     if written or any(cause in ("other-place", "other-lens") for cause, _ in since):
         return GradedCamera(checked, "wrong", [*written, *since], difference)
     return GradedCamera(checked, "drifted" if since else "good", since, difference)
@@ -87,30 +93,23 @@ def _difference(checked: CheckedCamera, found: CameraResult) -> Difference:
     )
 
 
-def _changes(checked: CheckedCamera, found: CameraResult, tolerance_px: float) -> list[tuple[CauseOfGrade, str]]:
-    """Return what happened to a camera since, or what else is wrong: each that alone moves the markings in view.
-
-    Where none does so alone, the one that moves them most.
-    """
-    pitch, meant, now = checked.pitch, checked.meant, found.camera
-    moved = Moved.between(pitch, meant, now)
-    if checked.searched == "anywhere" and moved.exceeds_limits:
+def _changes(checked: CheckedCamera, meant: Camera, now: Camera, tolerance_px: float) -> list[tuple[CauseOfGrade, str]]:
+    """Return what happened to a camera since, or what else is wrong, and no more than explains the markings in view."""
+    pitch = checked.pitch
+    if checked.searched == "anywhere" and Moved.between(pitch, meant, now).exceeds_limits:
         x, y, z = now.pose.position
         where = f"({x:.1f}, {y:.1f}, {z:.1f}) m"
         return [("other-place", f"the camera stands at {where}, and no reading of the file says so")]
-    longer = now.intrinsics.focal_length_px / meant.intrinsics.focal_length_px - 1
+    changed = fewest_changes(pitch, meant, now, tolerance_px)
+    of_pose = Moved.between(pitch, meant, changed.camera)
+    longer = changed.camera.intrinsics.focal_length_px / meant.intrinsics.focal_length_px - 1
     lens = f"its focal length is {abs(longer):.1%} {'longer' if longer > 0 else 'shorter'}"
     zoom: tuple[CauseOfGrade, str] = ("zoomed", f"zoomed: {lens}")
     if checked.searched == "lens":
         zoom = "other-lens", f"another lens fits the lines: {lens}"
-    alone: list[tuple[Camera, tuple[CauseOfGrade, str]]] = [
-        (meant.with_lens(now.intrinsics), zoom),
-        (_posed(meant, now.pose.rotation, meant.pose.position), ("turned", f"turned by {moved.rotation_deg:.2f}°")),
-        (_posed(meant, meant.pose.rotation, now.pose.position), ("moved", f"moved by {moved.position_m:.2f} m")),
-    ]
-    shifts = [(Moved.between(pitch, meant, changed).pixels, said) for changed, said in alone]
-    return [said for pixels, said in shifts if pixels > tolerance_px] or [max(shifts, key=lambda one: one[0])[1]]
-
-
-def _posed(camera: Camera, rotation: Array, position: Array) -> Camera:
-    return camera.with_pose(Pose(rotation, position))
+    said: dict[Change, tuple[CauseOfGrade, str]] = {
+        "zoomed": zoom,
+        "turned": ("turned", f"turned by {of_pose.rotation_deg:.2f}°"),
+        "moved": ("moved", f"moved by {of_pose.position_m:.2f} m"),
+    }
+    return [words for change, words in said.items() if change in changed.changes]

@@ -1,0 +1,44 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from testbed.synthetic import PITCH, camera
+from worker.calibration.checking.changes import COLUMNS, fewest_changes
+from worker.calibration.geometry.derivatives import moved
+from worker.calibration.geometry.parameters import with_lens_changed
+
+TOLERANCE_PX = 4.0
+WIDE = camera("wide", (-6.0, -46.0, 11.0), (-14.0, 0.0), focal=1900.0, size=(3840, 2160))
+# Clearly more than the tolerance, each by itself.
+BY = {"turned": [0.02, -0.03, 0.02], "zoomed": [130.0], "moved": [1.5, -1.2, 0.9]}
+
+
+def after(one, changes, times=1.0):
+    by = np.zeros(12)
+    for change in changes:
+        by[COLUMNS[change]] = times * np.array(BY[change])
+    return with_lens_changed(moved(one, by[:6]), by[6:])
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [(), ("turned",), ("zoomed",), ("moved",), ("turned", "zoomed"), ("turned", "moved"), ("zoomed", "moved")],
+)
+@given(times=st.floats(0.6, 1.5))
+def test_no_more_changes_are_named_than_happened(changes, times):
+    found = fewest_changes(PITCH, WIDE, after(WIDE, changes, times), TOLERANCE_PX)
+    assert found.changes == changes
+    expected = after(WIDE, changes, times)
+    assert found.camera.pose.position == pytest.approx(expected.pose.position, abs=1e-3)
+    assert found.camera.intrinsics.focal_length_px == pytest.approx(expected.intrinsics.focal_length_px, rel=1e-4)
+
+
+def test_what_is_off_by_less_than_the_tolerance_is_no_change_of_its_own():
+    """A file's place is good to some decimetres: a camera that was turned has not moved for that."""
+    off = moved(WIDE, np.array([0, 0, 0, 0.05, -0.05, 0.03]))
+    assert fewest_changes(PITCH, off, after(WIDE, ("turned",)), TOLERANCE_PX).changes == ("turned",)
+
+
+def test_all_three_changes_are_named_where_two_explain_too_little():
+    assert fewest_changes(PITCH, WIDE, after(WIDE, BY), TOLERANCE_PX).changes == ("turned", "zoomed", "moved")

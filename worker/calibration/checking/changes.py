@@ -1,0 +1,72 @@
+"""The fewest changes of a calibration that put the markings where a camera was found to see them.
+
+Pose and lens that were found differ from those of a file in all their numbers: a turn about a far place moves the lines
+of a long view as a shift of the camera does, and the file's own numbers are good to some pixels. So a change is only
+named where the markings cannot be explained without it.
+"""
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Literal
+
+import numpy as np
+
+from worker.calibration.geometry.camera import Array, Camera, Pose, inside
+from worker.calibration.geometry.derivatives import POSE_NUMBERS, full_pixel_jacobian, moved
+from worker.calibration.geometry.field import Field
+from worker.calibration.geometry.lens import LENS_PARAMETERS
+from worker.calibration.geometry.parameters import with_lens_changed
+
+Change = Literal["turned", "zoomed", "moved"]
+COLUMNS: dict[Change, list[int]] = {"turned": [0, 1, 2], "zoomed": [POSE_NUMBERS], "moved": [3, 4, 5]}
+"""Numbers of pose and lens that each change is of."""
+STEPS = 10
+
+
+@dataclass(frozen=True)
+class Changed:
+    """A camera after some `changes`, as close as they bring it to one that was found."""
+
+    changes: tuple[Change, ...]
+    camera: Camera
+
+
+def fewest_changes(pitch: Field, meant: Camera, found: Camera, tolerance_px: float) -> Changed:
+    """Return the fewest changes of `meant` that show the markings in view where `found` does, within a mean shift.
+
+    Of as many changes, those that come closest.
+    """
+    lines = pitch.line_points().position
+    places = lines[inside(found.project(lines), found.intrinsics.size)]
+    for number in range(len(COLUMNS)):
+        tried = [Changed(some, _closest(meant, found, some, places)) for some in combinations(COLUMNS, number)]
+        shifts = [_shift_px(one.camera, found, places) for one in tried]
+        best = int(np.argmin(shifts))
+        if shifts[best] <= tolerance_px:
+            return tried[best]
+    return Changed(("turned", "zoomed", "moved"), found)
+
+
+def _closest(meant: Camera, found: Camera, changes: Collection[Change], places: Array) -> Camera:
+    """Return the camera that these changes bring closest to the one that was found (Gauss-Newton)."""
+    turned, shifted = (found.pose if change in changes else meant.pose for change in ("turned", "moved"))
+    camera = meant.with_pose(Pose(turned.rotation, shifted.position))
+    if "zoomed" in changes:
+        camera = camera.with_lens(found.intrinsics)
+    columns = [column for change in changes for column in COLUMNS[change]]
+    for _ in range(STEPS):
+        offset = found.project(places) - camera.project(places)
+        jacobian = full_pixel_jacobian(camera, places)[:, :, columns]
+        known = np.isfinite(offset).all(axis=1) & np.isfinite(jacobian).all(axis=(1, 2))
+        if not columns or known.sum() < POSE_NUMBERS:
+            break
+        by = np.zeros(POSE_NUMBERS + len(LENS_PARAMETERS))
+        by[columns] = np.linalg.lstsq(jacobian[known].reshape(-1, len(columns)), offset[known].ravel(), rcond=None)[0]
+        camera = with_lens_changed(moved(camera, by[:POSE_NUMBERS]), by[POSE_NUMBERS:])
+    return camera
+
+
+def _shift_px(camera: Camera, found: Camera, places: Array) -> float:
+    shift = np.linalg.norm(camera.project(places) - found.project(places), axis=1)
+    return float(shift.mean()) if np.isfinite(shift).all() else np.inf
