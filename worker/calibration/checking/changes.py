@@ -8,7 +8,7 @@ named where the markings cannot be explained without it.
 from collections.abc import Collection
 from dataclasses import dataclass
 from itertools import combinations
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -19,9 +19,6 @@ from worker.calibration.geometry.lens import LENS_PARAMETERS
 from worker.calibration.geometry.parameters import with_lens_changed
 
 Change = Literal["turned", "zoomed", "moved"]
-COLUMNS: dict[Change, list[int]] = {"turned": [0, 1, 2], "zoomed": [POSE_NUMBERS], "moved": [3, 4, 5]}
-"""Numbers of pose and lens that each change is of."""
-STEPS = 10
 
 
 @dataclass(frozen=True)
@@ -39,13 +36,25 @@ def fewest_changes(pitch: Field, meant: Camera, found: Camera, tolerance_px: flo
     """
     lines = pitch.line_points().position
     places = lines[inside(found.project(lines), found.intrinsics.size)]
-    for number in range(len(COLUMNS)):
-        tried = [Changed(some, _closest(meant, found, some, places)) for some in combinations(COLUMNS, number)]
+    every = get_args(Change)
+    for number in range(len(every)):
+        tried = [Changed(some, _closest(meant, found, some, places)) for some in combinations(every, number)]
         shifts = [_shift_px(one.camera, found, places) for one in tried]
         best = int(np.argmin(shifts))
         if shifts[best] <= tolerance_px:
             return tried[best]
-    return Changed(("turned", "zoomed", "moved"), found)
+    return Changed(every, found)
+
+
+def columns_of(change: Change) -> list[int]:
+    """Return the numbers of a pose and a lens behind it, (12,), that a change is of."""
+    match change:
+        case "turned":
+            return [0, 1, 2]
+        case "moved":
+            return [3, 4, 5]
+        case "zoomed":
+            return [POSE_NUMBERS]
 
 
 def _closest(meant: Camera, found: Camera, changes: Collection[Change], places: Array) -> Camera:
@@ -54,8 +63,9 @@ def _closest(meant: Camera, found: Camera, changes: Collection[Change], places: 
     camera = meant.with_pose(Pose(turned.rotation, shifted.position))
     if "zoomed" in changes:
         camera = camera.with_lens(found.intrinsics)
-    columns = [column for change in changes for column in COLUMNS[change]]
-    for _ in range(STEPS):
+    columns = [column for change in changes for column in columns_of(change)]
+    steps = 10
+    for _ in range(steps):
         offset = found.project(places) - camera.project(places)
         jacobian = full_pixel_jacobian(camera, places)[:, :, columns]
         known = np.isfinite(offset).all(axis=1) & np.isfinite(jacobian).all(axis=(1, 2))

@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from testbed.synthetic import PITCH, camera
-from worker.calibration.checking.changes import COLUMNS, fewest_changes
+from worker.calibration.checking.changes import columns_of, fewest_changes
 from worker.calibration.geometry.derivatives import moved
 from worker.calibration.geometry.parameters import with_lens_changed
 
@@ -17,7 +17,7 @@ BY = {"turned": [0.02, -0.03, 0.02], "zoomed": [130.0], "moved": [1.5, -1.2, 0.9
 def after(one, changes, times=1.0):
     by = np.zeros(12)
     for change in changes:
-        by[COLUMNS[change]] = times * np.array(BY[change])
+        by[columns_of(change)] = times * np.array(BY[change])
     return with_lens_changed(moved(one, by[:6]), by[6:])
 
 
