@@ -1,7 +1,7 @@
 """Starts a program by fork from a process that has imported what it needs.
 
-No run waits for imports, or pays for them. The server sees no request: each run reads its own standard input. A run is a
-child of the process that started it, as one of `subprocess.Popen` is: the server forks twice, and that process is the
+No run waits for imports, or pays for them. The server sees no request: each run reads its own standard input. A run is
+a child of the process that started it, as one of `subprocess.Popen` is: the server forks twice, and that process is the
 nearest subreaper (prctl(2)) of what the first fork leaves behind. Linux only.
 
 `python -m worker.fork_server PROGRAM MODULE...` is the server of a module `PROGRAM`; it imports the others, too.

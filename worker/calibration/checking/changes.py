@@ -77,6 +77,16 @@ def _closest(meant: Camera, found: Camera, changes: Collection[Change], places: 
     return camera
 
 
+def shift_px(pitch: Field, meant: Camera, found: Camera) -> float:
+    """Return the mean shift of the markings in view of a camera that was found from where it was meant to see them.
+
+    Infinite where it was not meant to see most of them.
+    """
+    lines = pitch.line_points().position
+    return _shift_px(meant, found, lines[inside(found.project(lines), found.intrinsics.size)])
+
+
 def _shift_px(camera: Camera, found: Camera, places: Array) -> float:
     shift = np.linalg.norm(camera.project(places) - found.project(places), axis=1)
-    return float(shift.mean()) if np.isfinite(shift).all() else np.inf
+    known = np.isfinite(shift)
+    return float(shift[known].mean()) if known.mean() > 0.5 else np.inf

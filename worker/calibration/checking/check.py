@@ -14,13 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from worker.calibration.calibrate import calibrate
+from worker.calibration.checking.changes import shift_px
 from worker.calibration.checking.ranking import films_the_field, rank_readings
 from worker.calibration.checking.readings import Reading
 from worker.calibration.detection.evidence import TOLERANCE_PX
 from worker.calibration.detection.segmentation import whole_frame
 from worker.calibration.field_fit.measures import fit_field
 from worker.calibration.find_cameras import find_cameras
-from worker.calibration.gate.quality import CameraResult, Moved
+from worker.calibration.gate.quality import CameraResult
 from worker.calibration.geometry.camera import Camera, Frame
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.lens import Lens
@@ -82,9 +83,9 @@ class CheckedCamera:
 
     @property
     def moved_px(self) -> float:
-        """Mean shift of the markings in view from where it was meant to be to where it was found."""
+        """Mean shift of the markings in view from where it was meant to be to where it was found, or infinite."""
         assert self.found is not None
-        return Moved.between(self.pitch, self.meant, self.found.camera).pixels
+        return shift_px(self.pitch, self.meant, self.found.camera)
 
     @property
     def is_clearly_wrong(self) -> bool:

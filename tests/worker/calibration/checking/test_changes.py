@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from testbed.synthetic import PITCH, camera
-from worker.calibration.checking.changes import columns_of, fewest_changes
+from worker.calibration.checking.changes import columns_of, fewest_changes, shift_px
 from worker.calibration.geometry.derivatives import moved
 from worker.calibration.geometry.parameters import with_lens_changed
 
@@ -42,3 +42,9 @@ def test_what_is_off_by_less_than_the_tolerance_is_no_change_of_its_own():
 
 def test_all_three_changes_are_named_where_two_explain_too_little():
     assert fewest_changes(PITCH, WIDE, after(WIDE, BY), TOLERANCE_PX).changes == ("turned", "zoomed", "moved")
+
+
+@pytest.mark.parametrize("change", [[0, np.pi, 0, 0, 0, 0], [0, 0, 0, 0, 500, 0]])
+def test_a_camera_that_was_meant_to_see_nothing_of_the_field_is_far_off(change):
+    assert shift_px(PITCH, moved(WIDE, np.array(change, float)), WIDE) == np.inf
+    assert shift_px(PITCH, WIDE, WIDE) == 0
