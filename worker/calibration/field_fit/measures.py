@@ -29,10 +29,13 @@ QUANTITIES = {
     "length_m": "the pitch's length",
     "width_m": "the pitch's width",
     "ridge_height_m": "the ridge's height",
+    "skew_m": "a pitch out of square",
     "focal_length_px": "the focal length",
     "principal_point_x_px": "the principal point (x)",
     "principal_point_y_px": "the principal point (y)",
+    "aspect": "the aspect of the pixels",
     "k1": "the first radial coefficient",
+    "k2": "the second radial coefficient",
 }
 
 

@@ -17,8 +17,10 @@ from testbed.synthetic import (
 )
 from tests.worker.calibration.sights import observed
 from tests.worker.calibration.test_calibrate import white_on_green
-from worker.calibration.field_fit.measures import fit_field, fit_measures
+from worker.calibration.field_fit.measures import QUANTITIES, fit_field, fit_measures
 from worker.calibration.geometry.field import Field
+from worker.calibration.geometry.lens import LENS_PARAMETERS
+from worker.calibration.geometry.parameters import field_parameters
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
 
@@ -127,3 +129,7 @@ def test_a_handball_court_that_is_narrower_than_said_is_found_though_it_has_fewe
     assert refined.pitch.length == pytest.approx(39.8, abs=0.03)
     assert refined.pitch.width == pytest.approx(19.6, abs=0.03)
     assert measures["width_m"].known
+
+
+def test_every_number_that_a_measure_may_be_taken_for_has_a_name():
+    assert {*LENS_PARAMETERS, *(one.name for one in field_parameters(PITCH))} == {*QUANTITIES}
