@@ -5,7 +5,7 @@ of a long view as a shift of the camera does, and the file's own numbers are goo
 named where the markings cannot be explained without it.
 """
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Literal, get_args
@@ -29,16 +29,21 @@ class Changed:
     camera: Camera
 
 
-def fewest_changes(pitch: Field, meant: Camera, found: Camera, tolerance_px: float) -> Changed:
+def fewest_changes(
+    pitch: Field, meant: Camera, found: Camera, tolerance_px: float, open_numbers: Sequence[int] = ()
+) -> Changed:
     """Return the fewest changes of `meant` that show the markings in view where `found` does, within a mean shift.
 
-    Of as many changes, those that come closest.
+    Of as many changes, those that come closest. `open_numbers`: those of pose and lens, as of `columns_of`, that may be
+    anything, and are no change.
     """
     lines = pitch.line_points().position
     places = lines[inside(found.project(lines), found.intrinsics.size)]
     every = get_args(Change)
     for number in range(len(every)):
-        tried = [Changed(some, _closest(meant, found, some, places)) for some in combinations(every, number)]
+        tried = [
+            Changed(some, _closest(meant, found, some, places, open_numbers)) for some in combinations(every, number)
+        ]
         shifts = [_shift_px(one.camera, found, places) for one in tried]
         best = int(np.argmin(shifts))
         if shifts[best] <= tolerance_px:
@@ -57,13 +62,15 @@ def columns_of(change: Change) -> list[int]:
             return [POSE_NUMBERS]
 
 
-def _closest(meant: Camera, found: Camera, changes: Collection[Change], places: Array) -> Camera:
+def _closest(
+    meant: Camera, found: Camera, changes: Collection[Change], places: Array, open_numbers: Sequence[int]
+) -> Camera:
     """Return the camera that these changes bring closest to the one that was found (Gauss-Newton)."""
     turned, shifted = (found.pose if change in changes else meant.pose for change in ("turned", "moved"))
     camera = meant.with_pose(Pose(turned.rotation, shifted.position))
     if "zoomed" in changes:
         camera = camera.with_lens(found.intrinsics)
-    columns = [column for change in changes for column in columns_of(change)]
+    columns = sorted({*open_numbers, *(column for change in changes for column in columns_of(change))})
     steps = 10
     for _ in range(steps):
         offset = found.project(places) - camera.project(places)

@@ -11,6 +11,8 @@ from worker.calibration.checking.readings import Cause
 from worker.calibration.gate.displacement import measure_displacement
 from worker.calibration.gate.quality import CameraResult, Moved
 from worker.calibration.geometry.camera import Camera
+from worker.calibration.geometry.derivatives import POSE_NUMBERS
+from worker.calibration.geometry.lens import LENS_PARAMETERS
 from worker.calibration.robust import SURE
 
 Grade = Literal["good", "drifted", "wrong", "cannot-tell"]
@@ -67,9 +69,7 @@ def grade(checked: CheckedCamera, lens_folds: str | None) -> GradedCamera:
     since: list[tuple[CauseOfGrade, str]] = []
     if difference.pixels > tolerance:
         written += folds
-        # A lens that folds is wrong, whatever else is.
-        meant = checked.meant if lens_folds is None else checked.meant.with_lens(found.camera.intrinsics)
-        since += _changes(checked, meant, found.camera, tolerance)
+        since += _changes(checked, found.camera, tolerance, lens_folds)
     if written or any(cause in ("other-place", "other-lens") for cause, _ in since):
         return GradedCamera(checked, "wrong", [*written, *since], difference)
     return GradedCamera(checked, "drifted" if since else "good", since, difference)
@@ -93,14 +93,21 @@ def _difference(checked: CheckedCamera, found: CameraResult) -> Difference:
     )
 
 
-def _changes(checked: CheckedCamera, meant: Camera, now: Camera, tolerance_px: float) -> list[tuple[CauseOfGrade, str]]:
+def _changes(
+    checked: CheckedCamera, now: Camera, tolerance_px: float, lens_folds: str | None
+) -> list[tuple[CauseOfGrade, str]]:
     """Return what happened to a camera since, or what else is wrong, and no more than explains the markings in view."""
-    pitch = checked.pitch
+    pitch, meant = checked.pitch, checked.meant
     if checked.searched == "anywhere" and Moved.between(pitch, meant, now).exceeds_limits:
         x, y, z = now.pose.position
         where = f"({x:.1f}, {y:.1f}, {z:.1f}) m"
         return [("other-place", f"the camera stands at {where}, and no reading of the file says so")]
-    changed = fewest_changes(pitch, meant, now, tolerance_px)
+    if lens_folds is None:
+        changed = fewest_changes(pitch, meant, now, tolerance_px)
+    else:
+        # The lens is wrong, whatever else is.
+        numbers_of_lens = range(POSE_NUMBERS, POSE_NUMBERS + len(LENS_PARAMETERS))
+        changed = fewest_changes(pitch, meant.with_lens(now.intrinsics), now, tolerance_px, numbers_of_lens)
     of_pose = Moved.between(pitch, meant, changed.camera)
     longer = changed.camera.intrinsics.focal_length_px / meant.intrinsics.focal_length_px - 1
     lens = f"its focal length is {abs(longer):.1%} {'longer' if longer > 0 else 'shorter'}"

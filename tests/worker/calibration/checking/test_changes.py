@@ -48,3 +48,9 @@ def test_all_three_changes_are_named_where_two_explain_too_little():
 def test_a_camera_that_was_meant_to_see_nothing_of_the_field_is_far_off(change):
     assert shift_px(PITCH, moved(WIDE, np.array(change, float)), WIDE) == np.inf
     assert shift_px(PITCH, WIDE, WIDE) == 0
+
+
+def test_a_lens_that_may_be_any_explains_what_it_can():
+    there = with_lens_changed(WIDE, np.array([60.0, 9.0, -7.0, 0.0, 0.01, 0.0]))
+    assert fewest_changes(PITCH, WIDE, there, 1.0, range(6, 12)).changes == ()
+    assert fewest_changes(PITCH, WIDE, after(there, ("turned",)), 1.0, range(6, 12)).changes == ("turned",)
