@@ -41,7 +41,7 @@ class ProtocolError(Exception):
 
 
 class JobPrograms:
-    """Starts job programs: on Linux those that are modules by fork from a process that has loaded what they need."""
+    """Starts job programs: modules of this Python by fork from a process that has loaded what they need, on Linux."""
 
     def __init__(self, settings: Settings) -> None:
         self.resources = ComputeResources.of(settings)
@@ -49,8 +49,8 @@ class JobPrograms:
         self._environment = child_process.without_secrets() | settings.native_environment
         self._server: ForkServer | None = None
         match self._command:
-            case [*interpreter, "-m", module] if sys.platform == "linux":
-                command = [*interpreter, "-m", "worker.fork_server", module, *LOADED]
+            case [sys.executable, *flags, "-m", module] if sys.platform == "linux":
+                command = [sys.executable, *flags, "-m", "worker.fork_server", module, *LOADED]
                 self._server = ForkServer(command, self._environment)
 
     def prepare(self) -> None:
