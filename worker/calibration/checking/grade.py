@@ -50,7 +50,7 @@ class GradedCamera:
 def grade(checked: CheckedCamera, lens_folds: str | None) -> GradedCamera:
     """Return the grade of a camera; `lens_folds`: words about a lens that has no rays for a part of the picture.
 
-    A lens that folds where no marking is, in a corner of the sky, does no harm.
+    A lens that folds where no marking is does no harm: the frame is explained through it.
     """
     folds: list[tuple[CauseOfGrade, str]] = [] if lens_folds is None else [("folds", lens_folds)]
     found = checked.found
@@ -68,8 +68,9 @@ def grade(checked: CheckedCamera, lens_folds: str | None) -> GradedCamera:
         written.append(("distortion-order", "its coefficients are k1, k2, k3, p1, p2 and not k1, k2, p1, p2, k3"))
     since: list[tuple[CauseOfGrade, str]] = []
     if difference.pixels > tolerance:
-        written += folds
-        since += _changes(checked, found.camera, tolerance, lens_folds)
+        harmful = folds if checked.searched == "lens" else []
+        written += harmful
+        since += _changes(checked, found.camera, tolerance, lens_is_wrong=bool(harmful))
     if written or any(cause in ("other-place", "other-lens") for cause, _ in since):
         return GradedCamera(checked, "wrong", [*written, *since], difference)
     return GradedCamera(checked, "drifted" if since else "good", since, difference)
@@ -94,7 +95,7 @@ def _difference(checked: CheckedCamera, found: CameraResult) -> Difference:
 
 
 def _changes(
-    checked: CheckedCamera, now: Camera, tolerance_px: float, lens_folds: str | None
+    checked: CheckedCamera, now: Camera, tolerance_px: float, *, lens_is_wrong: bool
 ) -> list[tuple[CauseOfGrade, str]]:
     """Return what happened to a camera since, or what else is wrong, and no more than explains the markings in view."""
     pitch, meant = checked.pitch, checked.meant
@@ -102,12 +103,11 @@ def _changes(
         x, y, z = now.pose.position
         where = f"({x:.1f}, {y:.1f}, {z:.1f}) m"
         return [("other-place", f"the camera stands at {where}, and no reading of the file says so")]
-    if lens_folds is None:
-        changed = fewest_changes(pitch, meant, now, tolerance_px)
-    else:
-        # The lens is wrong, whatever else is.
+    if lens_is_wrong:
         numbers_of_lens = range(POSE_NUMBERS, POSE_NUMBERS + len(LENS_PARAMETERS))
         changed = fewest_changes(pitch, meant.with_lens(now.intrinsics), now, tolerance_px, numbers_of_lens)
+    else:
+        changed = fewest_changes(pitch, meant, now, tolerance_px)
     of_pose = Moved.between(pitch, meant, changed.camera)
     longer = changed.camera.intrinsics.focal_length_px / meant.intrinsics.focal_length_px - 1
     lens = f"its focal length is {abs(longer):.1%} {'longer' if longer > 0 else 'shorter'}"
