@@ -39,8 +39,9 @@ from service.schemas.geometry import Intrinsics, Pose
 from service.schemas.venue import VenueIn
 from testbed import real_pair
 from testbed.spoiled_calibrations import spoiled_ways
+from worker.calibration.checking.changes import shift_px
 from worker.calibration.checking.check import good_within_px
-from worker.calibration.geometry.camera import Camera, inside
+from worker.calibration.geometry.camera import Camera
 from worker.compute_resources import ComputeResources
 from worker.jobs.check import solve
 from worker.jobs.from_schemas import camera_of, pitch_of
@@ -160,10 +161,7 @@ def _changes(view: View, way: str) -> bool:
     One without k3, p1 and p2 has no coefficients to exchange, and a lens may fold where no marking is.
     """
     right, spoiled = camera_of(view.camera), camera_of(_spoiled(view, way))
-    lines = pitch_of(view.field).line_points().position
-    seen = right.project(lines)
-    shift = np.linalg.norm(spoiled.project(lines) - seen, axis=1)[inside(seen, right.intrinsics.size)]
-    return not shift.mean() <= good_within_px(right)
+    return shift_px(pitch_of(view.field), spoiled, right) > good_within_px(right)
 
 
 def _spoiled(view: View, way: str) -> CheckedCamera:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -46,11 +47,11 @@ def measured(process: int) -> Iterator[Cost]:
     ended = threading.Event()
 
     def watch() -> None:
-        while not ended.is_set() or set(tree(process)) - set(before):
-            for begun in set(tree(process)) - set(before):
+        while (begun := set(tree(process)) - set(before)) or not ended.is_set():
+            for one in begun:
                 with suppress(OSError, IndexError):
-                    cost.peak_mb = max(cost.peak_mb, peak_mb(begun))
-            ended.wait(SAMPLE_S)
+                    cost.peak_mb = max(cost.peak_mb, peak_mb(one))
+            time.sleep(SAMPLE_S)
 
     watching = threading.Thread(target=watch)
     spent = sum(core_s(one, children=True) for one in before)

@@ -132,11 +132,12 @@ def table(cameras: str, start: str, measured: dict[str, list[dict]]) -> Iterator
     yield f"\n{what}, {start}; medians of {runs}, core-seconds and seconds"
     yield f"\n| | {' | '.join(f'{name}: core s | s' for name in measured)} |"
     yield "|---|" + "---|---|" * len(measured)
-    lines: dict[str, tuple[Callable[[dict], float | None], Callable[[dict], float | None]]] = {}
-    lines["**all its processes**"] = (lambda row: row["core_s"], lambda _: None)
-    lines["POST to result"] = (lambda _: None, lambda row: row["answered_s"])
-    lines["its preview, looked at then"] = (lambda _: None, lambda row: row["looked_s"])
-    lines["peak memory, MB"] = (lambda row: row["peak_mb"], lambda _: None)
+    lines: dict[str, tuple[Callable[[dict], float | None], Callable[[dict], float | None]]] = {
+        "**all its processes**": (lambda row: row["core_s"], lambda _: None),
+        "POST to result": (lambda _: None, lambda row: row["answered_s"]),
+        "its preview, looked at then": (lambda _: None, lambda row: row["looked_s"]),
+        "peak memory, MB": (lambda row: row["peak_mb"], lambda _: None),
+    }
     for stage in measured["after"][0]["timings_s"]:
         lines[f"`{stage}`, by the answer"] = (_said("cpu_s", stage), _said("timings_s", stage))
     for title, values in lines.items():

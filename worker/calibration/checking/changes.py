@@ -37,8 +37,7 @@ def fewest_changes(
     Of as many changes, those that come closest. `open_numbers`: those of pose and lens, as of `columns_of`, that may be
     anything, and are no change.
     """
-    lines = pitch.line_points().position
-    places = lines[inside(found.project(lines), found.intrinsics.size)]
+    places = _in_view(pitch, found)
     every = get_args(Change)
     for number in range(len(every)):
         tried = [
@@ -89,8 +88,12 @@ def shift_px(pitch: Field, meant: Camera, found: Camera) -> float:
 
     Infinite where it was not meant to see most of them.
     """
+    return _shift_px(meant, found, _in_view(pitch, found))
+
+
+def _in_view(pitch: Field, camera: Camera) -> Array:
     lines = pitch.line_points().position
-    return _shift_px(meant, found, lines[inside(found.project(lines), found.intrinsics.size)])
+    return lines[inside(camera.project(lines), camera.intrinsics.size)]
 
 
 def _shift_px(camera: Camera, found: Camera, places: Array) -> float:
