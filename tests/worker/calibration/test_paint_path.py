@@ -11,6 +11,7 @@ from models import MODEL_PATH
 from testbed.synthetic import GRASS, PAINTS, camera, moved, paint_frame, paint_markings
 from worker.calibration import solve
 from worker.calibration.calibrate import calibrate
+from worker.calibration.checking.ranking import rank_readings
 from worker.calibration.detection.segmentation import Segmenter
 from worker.calibration.find_cameras import find_cameras
 from worker.calibration.gate.quality import Moved
@@ -19,8 +20,9 @@ from worker.calibration.paint_path import log_odds
 from worker.calibration.problem import Problem
 from worker.calibration.records import Options
 from worker.calibration.relocalisation.field_map import FieldMap
-from worker.calibration.relocalisation.field_paint import draw_field_paint
-from worker.calibration.relocalisation.sought import Place, SoughtCamera, SoughtLens
+from worker.calibration.relocalisation.field_paint import FloorPaints, draw_field_paint
+from worker.calibration.relocalisation.line_view import LineView
+from worker.calibration.relocalisation.sought import KNOCKED_ROLL_DEG, Place, SoughtCamera, SoughtLens
 
 pytestmark = pytest.mark.slow
 
@@ -129,3 +131,15 @@ def test_without_a_pose_the_paint_of_the_field_is_the_one_whose_lines_a_camera_e
 def test_a_frame_with_lines_of_one_colour_is_not_searched_by_colour():
     alone = paint_frame(NETBALL, CAMERA)
     assert draw_field_paint(FieldMap.of(NETBALL), SOUGHT, alone, Segmenter(MODEL_PATH, 1), 0) is None
+
+
+def test_the_convention_of_a_file_is_told_by_the_paint_of_its_field():
+    pose = CAMERA.pose
+    in_centimetres = CAMERA.with_pose(replace(pose, position=100 * pose.position))
+    paints = FloorPaints.of([frame()], Segmenter(MODEL_PATH, 1))
+    in_all_colours, *by_paint = (
+        [LineView.of(response, CAMERA.intrinsics, KNOCKED_ROLL_DEG)]
+        for (response,) in (paints.responses, *paints.responses_by_paint())
+    )
+    assert rank_readings(NETBALL, [in_centimetres], [in_all_colours], 0) == []
+    assert rank_readings(NETBALL, [in_centimetres], by_paint, 0)[0].causes == ("centimetres",)

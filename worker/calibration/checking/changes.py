@@ -32,22 +32,27 @@ class Changed:
 def fewest_changes(
     pitch: Field, meant: Camera, found: Camera, tolerance_px: float, open_numbers: Sequence[int] = ()
 ) -> Changed:
-    """Return the fewest changes of `meant` that show the markings in view where `found` does, within a mean shift.
+    """Return the fewest changes of `meant` that show the markings in view where `found` does.
 
-    Of as many changes, those that come closest. `open_numbers`: those of pose and lens, as of `columns_of`, that may be
-    anything, and are no change.
+    `tolerance_px`: the mean shift that nothing has to explain, three sigma. Each change has to explain as much: the
+    square of what is left over, in tolerances, and the number of changes together are least. `open_numbers`: those of
+    pose and lens, as of `columns_of`, that may be anything, and are no change.
     """
     places = _in_view(pitch, found)
     every = get_args(Change)
-    for number in range(len(every)):
-        tried = [
-            Changed(some, _closest(meant, found, some, places, open_numbers)) for some in combinations(every, number)
-        ]
-        shifts = [_shift_px(one.camera, found, places) for one in tried]
-        best = int(np.argmin(shifts))
-        if shifts[best] <= tolerance_px:
-            return tried[best]
-    return Changed(every, found)
+    # What is zoomed has its lens but for the focal length, or another one altogether.
+    zoomed = (meant, meant.with_lens(found.intrinsics))
+    tried = [
+        Changed(some, _closest(start, found, some, places, open_numbers))
+        for number in range(len(every))
+        for some in combinations(every, number)
+        for start in (zoomed if "zoomed" in some else (meant,))
+    ]
+
+    def cost(one: Changed) -> float:
+        return (_shift_px(one.camera, found, places) / tolerance_px) ** 2 + len(one.changes)
+
+    return min([*tried, Changed(every, found)], key=cost)
 
 
 def columns_of(change: Change) -> list[int]:
@@ -67,8 +72,6 @@ def _closest(
     """Return the camera that these changes bring closest to the one that was found (Gauss-Newton)."""
     turned, shifted = (found.pose if change in changes else meant.pose for change in ("turned", "moved"))
     camera = meant.with_pose(Pose(turned.rotation, shifted.position))
-    if "zoomed" in changes:
-        camera = camera.with_lens(found.intrinsics)
     columns = sorted({*open_numbers, *(column for change in changes for column in columns_of(change))})
     steps = 10
     for _ in range(steps):

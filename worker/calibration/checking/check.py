@@ -8,6 +8,7 @@ at another resolution, the camera turned where it stands, zoomed where it stands
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import product
 from typing import Literal
 
 import numpy as np
@@ -28,6 +29,7 @@ from worker.calibration.geometry.lens import Lens
 from worker.calibration.geometry.plausible_pose import films_a_field
 from worker.calibration.records import CalibrationError, Options, Progress, ProgressReporter, Recover, Segment
 from worker.calibration.recovery import LEAST_PAINT, ON_ITS_MOUNT_M, UNEXPLAINED_BY_WEATHER
+from worker.calibration.relocalisation.field_paint import FloorPaints
 from worker.calibration.relocalisation.line_view import LineView
 from worker.calibration.relocalisation.paint import Paint
 from worker.calibration.relocalisation.sought import (
@@ -250,7 +252,7 @@ class _Checker:
         given = self.given[id]
         explained = None
         if id not in self.unusable:
-            paint = Paint.of(self._response(given))
+            paint = Paint.of(self._response(id))
             if len(paint.middles) >= LEAST_PAINT:
                 explained = paint.explained_by(self.pitch, given.camera) if given.has_pose else None
         return CheckedCamera(
@@ -266,26 +268,36 @@ class _Checker:
         )
 
     def likeliest_readings(self) -> Iterator[tuple[Reading, bool]]:
-        """Yield the readings, and whether with resized lenses, by which the open cameras are calibrated next."""
-        for resized in (False, True):
+        """Yield the readings, and whether with resized lenses, by which the open cameras are calibrated next.
+
+        By their lines in all colours first; then by each paint on the floor, since those of other sports hide the
+        field's.
+        """
+        for sights, resized in product((self._sight, self._sights_by_paint), (False, True)):
             cameras = [one for one in self.open if one.has_pose and (one.resized is not None or not resized)]
             if not cameras:
                 continue
             meant = [self._meant(one, TAKEN_AT_ITS_WORD, resized) for one in cameras]
-            ranked = rank_readings(self.pitch, meant, [self._view(one, resized) for one in cameras], self.seed)
+            ranked = rank_readings(self.pitch, meant, sights(meant), self.seed)
             # At its word the file was tried already, but not with a resized lens.
             for reading in [one for one in ranked if resized or one.causes][:CALIBRATED]:
                 if self.open:
                     yield reading, resized
 
-    def _view(self, given: GivenCamera, resized: bool) -> LineView:
-        return LineView.of(self._response(given), self._lens(given, resized), KNOCKED_ROLL_DEG)
+    def _sight(self, cameras: Sequence[Camera]) -> Iterator[list[LineView]]:
+        """Yield the views of cameras in all colours."""
+        yield _views(cameras, [self._response(one.id) for one in cameras])
 
-    def _response(self, given: GivenCamera) -> NDArray[np.uint8]:
+    def _sights_by_paint(self, cameras: Sequence[Camera]) -> Iterator[list[LineView]]:
+        """Yield the views of cameras in each of several paints."""
+        paints = FloorPaints.of([self.frames[one.id][0] for one in cameras], self.segment)
+        if paints.are_several:
+            yield from (_views(cameras, responses) for responses in paints.responses_by_paint())
+
+    def _response(self, id: str) -> NDArray[np.uint8]:
         """Return the network's response (H, W) to the first frame of a camera."""
-        id = given.camera.id
         if id not in self._responses:
-            self._responses[id] = self.segment(self.frames[id][0], whole_frame(given.camera.intrinsics.size))
+            self._responses[id] = self.segment(self.frames[id][0], whole_frame(self.given[id].camera.intrinsics.size))
         return self._responses[id]
 
     def _calibrated(
@@ -346,3 +358,11 @@ class _Checker:
             return None
         place = Place(position=given.camera.pose.position, radius_m=ON_ITS_MOUNT_M)
         return SoughtCamera(given.camera.id, unknown_lenses(given.camera.intrinsics.size), place)
+
+
+def _views(cameras: Sequence[Camera], responses: Sequence[NDArray[np.uint8]]) -> list[LineView]:
+    """Return the views of cameras in the responses (H, W) of the network, of any size."""
+    return [
+        LineView.of(response, camera.intrinsics, KNOCKED_ROLL_DEG)
+        for camera, response in zip(cameras, responses, strict=True)
+    ]

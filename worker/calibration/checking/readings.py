@@ -59,8 +59,11 @@ class Reading:
 
     @property
     def is_half_turn(self) -> bool:
-        """True if all that it changes is half a turn about the middle of the field."""
-        return self.causes == ("world-axes",) and np.array_equal(self.axes, np.diag([-1.0, -1.0, 1.0]))
+        """True if its axes are the file's after half a turn about the middle of the field.
+
+        On a field that half a turn does not change, another reading means the same without one.
+        """
+        return np.array_equal(self.axes, np.diag([-1.0, -1.0, 1.0]))
 
     @property
     def words(self) -> tuple[str, ...]:

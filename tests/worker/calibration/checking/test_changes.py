@@ -40,6 +40,15 @@ def test_what_is_off_by_less_than_the_tolerance_is_no_change_of_its_own():
     assert fewest_changes(PITCH, off, after(WIDE, ("turned",)), TOLERANCE_PX).changes == ("turned",)
 
 
+def test_a_change_that_explains_less_than_the_tolerance_is_not_named():
+    """What the lens of a file is off by is not made up for by a turn."""
+    there = with_lens_changed(after(WIDE, ("zoomed",)), np.array([0, 0, 0, 0.03, 0, 0]))
+    by_zoom = fewest_changes(PITCH, WIDE, there, 1e3 * TOLERANCE_PX, [6])
+    tolerance = shift_px(PITCH, by_zoom.camera, there) / 1.1
+    assert by_zoom.changes == ()
+    assert fewest_changes(PITCH, WIDE, there, tolerance).changes == ("zoomed",)
+
+
 def test_all_three_changes_are_named_where_two_explain_too_little():
     assert fewest_changes(PITCH, WIDE, after(WIDE, BY), TOLERANCE_PX).changes == ("turned", "zoomed", "moved")
 

@@ -60,3 +60,14 @@ def test_readings_say_in_words_what_differs():
     assert "its places are in centimetres, not in metres" in words
     assert "x, y, z of the field are x, -z, y of its world" in words
     assert all(len(reading.words) == len(reading.causes) for reading in ALL)
+
+
+def test_on_a_symmetric_field_what_is_half_turned_is_read_without_a_turn():
+    given_pose = Pose(np.array([1.5, 0.2, -0.3]), np.array([-1.0, -49.0, 8.0]))
+    without = {reading.causes: [] for reading in ALL}
+    for reading in ALL:
+        without[reading.causes].append(reading.pose(given_pose, HALF))
+    for reading in (one for one in ALL if one.is_half_turn):
+        pose = reading.pose(given_pose, HALF)
+        simpler = tuple(cause for cause in reading.causes if cause != "world-axes")
+        assert any(is_same_on_a_symmetric_field(one, pose.matrix, pose.position) for one in without[simpler])
