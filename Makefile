@@ -124,7 +124,7 @@ bench-check: setup
 	$(BENCH).check
 
 # The Fixed Camera Calibration Bench: benchmarks/fccb/README.md.
-bench-fccb: setup
+bench-fccb: $(VENV)/.bench
 	$(BENCH).fccb make runs/fccb/public --seed 1
 	$(BENCH).fccb table runs/fccb/public
 

@@ -1,7 +1,7 @@
 """Train what `make bench` compares with: `python -m benchmarks.learned`.
 
-All nets learn from the same batches; called again, it goes on where it stopped. The weights are kept in
-`runs/bench/learned`. Six hours of one core, or twenty minutes of a machine with a GPU:
+All nets learn from the same batches; called again, it goes on where it stopped. The weights are written to
+`benchmarks/learned/trained`. Some three hours of one core, or twenty minutes of a machine with a GPU:
 
     python -m benchmarks.learned --device cuda --workers 14
 """
@@ -23,7 +23,7 @@ def main() -> None:
     """Train what is asked for."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--nets", nargs="+", choices=NETS, default=list(NETS), help="all, unless said")
-    parser.add_argument("--steps", type=int, default=7000, help="of the whole schedule")
+    parser.add_argument("--steps", type=int, default=4500, help="of the whole schedule")
     parser.add_argument("--batch", type=int, default=64)
     parser.add_argument("--device", default="cpu", help="cpu or cuda")
     parser.add_argument("--workers", type=int, default=0, help="processes that draw pairs; none: drawn in between")

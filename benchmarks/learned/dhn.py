@@ -13,7 +13,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from benchmarks.learned.net import Net
+from benchmarks.learned.net import Net, convolved
 from benchmarks.learned.pool import Batch
 from benchmarks.learned.window import SIZE
 
@@ -39,7 +39,7 @@ class Dhn(Net):
     def forward(self, seen: Tensor, template: Tensor) -> Tensor:
         """One shot."""
         both = torch.cat([seen, template], dim=1).contiguous(memory_format=torch.channels_last)
-        return LARGEST_PX * self.head(self.layers(both)).reshape(-1, 4, 2)
+        return LARGEST_PX * self.head(convolved(self.layers, both)).reshape(-1, 4, 2)
 
     def loss(self, batch: Batch) -> Tensor:
         """The mean distance of a coordinate, less strict below a pixel."""

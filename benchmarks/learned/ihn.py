@@ -15,7 +15,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from benchmarks.learned.net import Net
+from benchmarks.learned.net import Net, convolved
 from benchmarks.learned.pool import Batch
 from benchmarks.learned.warp import LARGEST_PX, homographies, moved, pixels
 from benchmarks.learned.window import SIZE
@@ -59,7 +59,7 @@ class Ihn(Net):
 
     def forward(self, seen: Tensor, template: Tensor, steps: int) -> list[Tensor]:
         """The displacements after each step, from none on."""
-        asking, answering = self.features(torch.cat([seen, template]).contiguous()).chunk(2)
+        asking, answering = convolved(self.features, torch.cat([seen, template]).contiguous()).chunk(2)
         asking = functional.avg_pool2d(asking, ASKED_EVERY // ANSWERED_EVERY)
         levels = likeness(asking, answering)
         places = pixels(ASKED_EVERY).to(seen)
@@ -71,7 +71,7 @@ class Ihn(Net):
             around = torch.cat([looked_up(level, at, ANSWERED_EVERY << i) for i, level in enumerate(levels)], dim=-1)
             told = torch.cat([around, (at - places) / ASKED_EVERY], dim=-1).transpose(1, 2)
             told = told.reshape(len(seen), -1, SIZE[1] // ASKED_EVERY, SIZE[0] // ASKED_EVERY)
-            step = STEP_PX * self.aggregate(told).reshape(-1, 4, 2)
+            step = STEP_PX * convolved(self.aggregate, told).reshape(-1, 4, 2)
             offsets = offsets + step
             after.append(offsets)
             offsets = offsets.detach().clamp(-LARGEST_PX, LARGEST_PX)
@@ -93,11 +93,12 @@ class Ihn(Net):
 
 def likeness(asking: Tensor, answering: Tensor) -> list[Tensor]:
     """Correlate each asking place (Q of them) with all of the answering ones: (B, Q, h, w), then at half the size."""
-    batch, features, height, width = answering.shape
-    product = (asking / math.sqrt(features)).flatten(2).transpose(1, 2) @ answering.flatten(2)
-    levels = [product.reshape(batch, -1, height, width)]
-    for _ in range(LEVELS - 1):
-        levels.append(functional.avg_pool2d(levels[-1], 2))
+    asked = (asking / math.sqrt(asking.shape[1])).flatten(2).transpose(1, 2)
+    levels = []
+    for _ in range(LEVELS):
+        levels.append((asked @ answering.flatten(2)).unflatten(2, answering.shape[2:]))
+        # The mean of likenesses is the likeness to the mean.
+        answering = functional.avg_pool2d(answering, 2)
     return levels
 
 

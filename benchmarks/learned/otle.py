@@ -15,7 +15,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from benchmarks.learned.dhn import Dhn, vgg
-from benchmarks.learned.net import Net, loaded
+from benchmarks.learned.net import Net, convolved, loaded
 from benchmarks.learned.pool import Batch
 from benchmarks.learned.warp import homographies, warped
 
@@ -41,7 +41,7 @@ class Otle(Net):
         """The error of the displacements (B, 4, 2)."""
         laid = warped(template, homographies(offsets))
         both = torch.cat([seen, laid], dim=1).contiguous(memory_format=torch.channels_last)
-        return functional.softplus(self.head(self.layers(both)).squeeze(1))
+        return functional.softplus(self.head(convolved(self.layers, both)).squeeze(1))
 
     def loss(self, batch: Batch) -> Tensor:
         """Between what it says of random candidates and how wrong they are."""

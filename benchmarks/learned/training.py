@@ -7,6 +7,7 @@ import math
 import time
 from collections.abc import Sequence
 from itertools import islice
+from pathlib import Path
 
 import torch
 from torch import Tensor
@@ -14,7 +15,7 @@ from torch import Tensor
 from benchmarks.learned.net import Net
 from benchmarks.learned.pairs import Pairs
 from benchmarks.learned.pool import Batch, Pool, batch_of
-from benchmarks.learned.weights import weights
+from benchmarks.learned.weights import checkpoint, weights
 
 RATE, LAST_RATE, WARM_UP = 1e-3, 0.02, 0.02
 WEIGHT_DECAY = 1e-4
@@ -23,15 +24,15 @@ VALIDATED_BY, VALIDATED_AT_ONCE, VALIDATION_SEED = 256, 32, 1_000_000
 
 
 class Training:
-    """A net, its optimiser, and how many steps of its schedule of `steps` are behind; kept in the file `weights`."""
+    """A net, its optimiser, and how many steps of its schedule of `steps` are behind; kept in its `checkpoint`."""
 
     def __init__(self, name: str, net: Net, steps: int, device: torch.device) -> None:
         self.name, self.steps, self.step = name, steps, 0
         self.net = net.to(device, memory_format=torch.channels_last)
         self.optimiser = torch.optim.AdamW(net.parameters(), lr=RATE, weight_decay=WEIGHT_DECAY)
         self.losses: list[Tensor] = []
-        if weights(name).exists():
-            state = torch.load(weights(name), map_location=device, weights_only=True)
+        if checkpoint(name).exists():
+            state = torch.load(checkpoint(name), map_location=device, weights_only=True)
             self.net.load_state_dict(state["net"])
             self.optimiser.load_state_dict(state["optimiser"])
             self.step = state["step"]
@@ -58,12 +59,13 @@ class Training:
 
     def save(self) -> None:
         """Write all that is needed to go on."""
-        path = weights(self.name)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        partial = path.with_suffix(".partial")
-        state = {"net": self.net.state_dict(), "optimiser": self.optimiser.state_dict(), "step": self.step}
-        torch.save(state, partial)
-        partial.rename(path)
+        net, optimiser = self.net.state_dict(), self.optimiser.state_dict()
+        _write({"net": net, "optimiser": optimiser, "step": self.step}, checkpoint(self.name))
+
+    def finish(self) -> None:
+        """Write the weights that answer, as they are shipped: matrices in half precision."""
+        state = self.net.state_dict()
+        _write({name: part.half() if part.ndim > 1 else part for name, part in state.items()}, weights(self.name))
 
 
 def train(trainings: Sequence[Training], pool: Pool, batch_size: int) -> None:
@@ -83,12 +85,20 @@ def train(trainings: Sequence[Training], pool: Pool, batch_size: int) -> None:
             saved = time.monotonic()
     for training in trainings:
         training.save()
+        training.finish()
         print(json.dumps(_summary(training)), flush=True)
 
 
 def rate_at(share: float) -> float:
     """The learning rate, relative to the largest, when this share of the schedule is behind."""
     return min(1.0, share / WARM_UP) * (LAST_RATE + (1 - LAST_RATE) * (1 + math.cos(math.pi * min(1.0, share))) / 2)
+
+
+def _write(state: dict[str, object], path: Path) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.with_suffix(".partial")
+    torch.save(state, partial)
+    partial.rename(path)
 
 
 def _summary(training: Training) -> dict[str, object]:

@@ -111,7 +111,10 @@ def test_where_nothing_is_seen_ecc_leaves_the_pose_as_it_was(ground, camera):
 
 
 def test_missing_weights_are_told_with_the_command_that_makes_them(tmp_path, monkeypatch):
-    monkeypatch.setattr(weights, "WEIGHTS", tmp_path)
+    monkeypatch.setattr(weights, "TRAINED", tmp_path)
+    monkeypatch.setattr(weights, "find_spec", lambda _: "installed")
     assert "python -m benchmarks.learned --nets dhn otle" in weights.missing(("dhn", "otle"))
     weights.weights("dhn").touch()
     assert weights.missing(("dhn",)) is None
+    monkeypatch.setattr(weights, "find_spec", lambda _: None)
+    assert "pip install '.[bench]'" in weights.missing(("dhn",))

@@ -76,11 +76,12 @@ def test_workers_draw_pairs_of_their_own():
 
 @pytest.mark.parametrize("name", NETS)
 def test_every_net_learns_and_goes_on_where_it_stopped(name, tmp_path, monkeypatch, pairs, capsys):
-    monkeypatch.setattr(weights, "WEIGHTS", tmp_path)
+    monkeypatch.setattr(weights, "CHECKPOINTS", tmp_path / "begun")
+    monkeypatch.setattr(weights, "TRAINED", tmp_path)
     monkeypatch.setattr("benchmarks.learned.training.VALIDATED_BY", 2)
     monkeypatch.setattr("benchmarks.learned.pool.FIRST", 1)
     monkeypatch.setattr(NETS[name], "tried_steps", (1,))
-    torch.save({"net": NETS["dhn"]().state_dict()}, weights.weights("dhn"))
+    torch.save(NETS["dhn"]().state_dict(), weights.weights("dhn"))
     if name == "dhn":
         weights.weights("dhn").unlink()
     for steps in (1, 2):
