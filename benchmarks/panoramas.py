@@ -31,6 +31,7 @@ from worker.calibration.find_cameras import find_cameras
 from worker.calibration.gate.quality import CameraResult
 from worker.calibration.geometry.camera import Camera, Pose
 from worker.calibration.geometry.field import Field
+from worker.calibration.geometry.lens import LensModel
 from worker.calibration.geometry.lens_models import PANORAMAS
 from worker.calibration.records import CalibrationError, Options
 from worker.calibration.relocalisation.relocalise import twin
@@ -47,7 +48,7 @@ class Venue:
     """A rendered venue: its `scene`, and the kind of panorama of all its cameras."""
 
     scene: Scene
-    model: str
+    model: LensModel
 
 
 def main() -> None:
@@ -67,7 +68,7 @@ def main() -> None:
 def venue(number: int) -> Venue:
     """Return a venue, rendered."""
     rng = np.random.default_rng([31, number])
-    model = "equirectangular" if number % 3 == 2 else "cylindrical"
+    model: LensModel = "equirectangular" if number % 3 == 2 else "cylindrical"
     tilt_deg = STEEPEST_DEG * (number % 10) / 9
     crown = rng.uniform(0.1, 0.4)
     pitch = Field(105.0, 68.0, 0.12, np.array([[-18.5, 0.0, crown], [18.5, 0.0, crown]]), sigma=TAPED)
@@ -78,7 +79,7 @@ def venue(number: int) -> Venue:
     return Venue(Scene(f"panorama-{number}", True, pitch, cameras, cameras, frames), model)
 
 
-def _camera(name: str, model: str, x: float, tilt_deg: float, rng: np.random.Generator) -> Camera:
+def _camera(name: str, model: LensModel, x: float, tilt_deg: float, rng: np.random.Generator) -> Camera:
     lens = panorama_of_view(SIZE, PANORAMAS[model], VIEW_DEG + rng.uniform(-VIEW_OFF_DEG, VIEW_OFF_DEG))
     stretch = 1 + rng.uniform(-STRETCH, STRETCH)
     lens = replace(lens, matrix=lens.matrix * [[1, 1, 1], [1, stretch, 1], [1, 1, 1]])

@@ -306,7 +306,7 @@ def state_of(database_url: str) -> dict[str, float]:
         ).fetchone()
         ours = "SELECT coalesce(sum(pg_total_relation_size(c.oid)), 0) FROM pg_class c JOIN pg_namespace n ON "
         ours += "n.oid = c.relnamespace WHERE c.relkind = 'r' AND n.nspname = %s"
-        public, dbos = (float(connection.execute(ours, (schema,)).fetchone()[0]) for schema in ("public", "dbos"))
+        public, dbos = (float(connection.execute(ours, (schema,)).fetchall()[0][0]) for schema in ("public", "dbos"))
     return {
         "commits": float(commits),
         "rows": float(written),
@@ -324,7 +324,7 @@ def cpu_s(processes: list[subprocess.Popen], *, children: bool = False) -> float
 
 def cpu_s_of_postgres(database_url: str) -> float:
     with psycopg.connect(database_url) as connection:
-        file = connection.execute("SELECT setting FROM pg_settings WHERE name = 'data_directory'").fetchone()[0]
+        file = connection.execute("SELECT setting FROM pg_settings WHERE name = 'data_directory'").fetchall()[0][0]
     postmaster = int((Path(file) / "postmaster.pid").read_text().split()[0])
     backends = [int(child) for child in Path(f"/proc/{postmaster}/task/{postmaster}/children").read_text().split()]
     spent = 0.0

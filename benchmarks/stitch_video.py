@@ -118,7 +118,7 @@ def _panorama(home: Path, frames: dict[str, np.ndarray], lit: bool) -> Panorama:
     found = evened_out(pitch, cameras, frames) if lit else {}
     for camera in document["cameras"]:
         light = found.get(camera["id"])
-        camera["light"] = light_to_schema(light or NEUTRAL)
+        camera["light"] = light_to_schema(light or NEUTRAL).model_dump()
     (home / "venue.json").write_text(json.dumps(document))
     return panorama(pitch, chosen_view(pitch, cameras, CHOICE), cameras, found)
 

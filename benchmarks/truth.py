@@ -67,6 +67,7 @@ def overlapping(scene: Scene) -> list[tuple[int, int]]:
 def apart_by_homography_px(scene: Scene, i: int, j: int, homography: np.ndarray) -> float:
     """The stitch error where the undistorted picture of camera j is laid onto that of camera i by (3, 3)."""
     point = _common(scene, i, j)
+    assert point is not None, "cameras that overlap were asked for"
     first, second = (scene.real[k].project(point[None])[0] for k in (i, j))
     laid = homography @ _pinhole(scene.cameras[j].intrinsics, second)
     ray = np.linalg.solve(scene.cameras[i].intrinsics.matrix, laid)
@@ -82,6 +83,7 @@ def _pinhole(lens: Lens, pixel: np.ndarray) -> np.ndarray:
 def _apart_px(scene: Scene, i: int, j: int, found: Sequence[Camera]) -> float:
     """Distance between where two cameras put what both see of the pitch centre, 1 px = 10 cm."""
     point = _common(scene, i, j)
+    assert point is not None, "cameras that overlap were asked for"
     first, second = (placed(scene, found[k], scene.real[k].project(point[None])[0]) for k in (i, j))
     return 10 * float(np.linalg.norm(first - second))
 

@@ -97,14 +97,12 @@ class CameraAnswer(BaseModel):
     def of(cls, camera: Camera, *, accepted: bool, sigma: Sigma | None = None) -> CameraAnswer:
         """Return the answer that a camera stands where it does, with its lens."""
         pose = pose_to_schema(camera.pose)
-        return cls.model_validate(
-            {
-                "id": camera.id,
-                "accepted": accepted,
-                "pose": {"rotation": pose["rotation"], "position": pose["position"]},
-                "intrinsics": lens_to_schema(camera.intrinsics),
-                "sigma": sigma,
-            }
+        return cls(
+            id=camera.id,
+            accepted=accepted,
+            pose=PoseIn(rotation=pose.rotation, position=pose.position),
+            intrinsics=lens_to_schema(camera.intrinsics),
+            sigma=sigma,
         )
 
     def posed(self, known: SoughtCameraIn, size: Sequence[int]) -> Camera | None:

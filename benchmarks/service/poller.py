@@ -48,7 +48,7 @@ class Poller:
         length = LENGTH.search(head)
         if not end or len(body) < (int(length[1]) if length else 0):
             return None
-        self._etag = ETAG.search(head)[1]
+        (self._etag,) = ETAG.findall(head)
         self._received, self.asking = b"", False
         answer = int(head.split(b" ", 2)[1]), time.perf_counter() - self.due
         self.due += self._every_s

@@ -110,6 +110,14 @@ def test_rigs_are_scored_by_where_two_cameras_put_common_lines(tmp_path):
     assert off.stitch_cm == pytest.approx([2.0], abs=1e-6)
 
 
+@pytest.mark.parametrize("method", ["stored", "clicks"])
+def test_a_baseline_answers_a_set(tmp_path, method):
+    cases = a_set(tmp_path / "set", [camera("a", (0, -48, 10), (0, 0))])
+    folders = [str(tmp_path / "set"), str(tmp_path / "answers")]
+    assert main(["answer", *folders, "--method", method]) == 0
+    assert overall(score(cases, tmp_path / "answers")) == pytest.approx(100)
+
+
 def test_a_program_that_knows_nothing_of_esc_answers_a_set(tmp_path, capsys):
     real = camera("a", (0, -48, 10), (0, 0))
     a_set(tmp_path / "set", [real])
