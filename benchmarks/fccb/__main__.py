@@ -29,7 +29,7 @@ from benchmarks.fccb.datasets import DATASETS
 from benchmarks.fccb.importing import import_dataset, import_frames
 from benchmarks.fccb.making import make_set
 from benchmarks.fccb.methods import BASELINES, THREADS, answer_all
-from benchmarks.fccb.scoring import COLUMNS, overall, score
+from benchmarks.fccb.scoring import COLUMNS, AnswersError, overall, score
 from benchmarks.fccb.sets import TASKS, CaseSet
 from benchmarks.printing import table_head
 from service.cli.arguments import parse_field, parse_frame_files
@@ -115,7 +115,10 @@ def _parser() -> argparse.ArgumentParser:
 
 def _print_table(cases: CaseSet, answers: Sequence[Path]) -> None:
     """Print a row per method and task, the best method first."""
-    scores = {folder.name: score(cases, folder) for folder in answers}
+    try:
+        scores = {folder.name: score(cases, folder) for folder in answers}
+    except AnswersError as error:
+        raise SystemExit(str(error)) from error
     print(table_head(f"method | task | {COLUMNS}"))
     for name in sorted(scores, key=lambda name: -overall(scores[name])):
         print(f"| {name} | all | {overall(scores[name]):.0f} | | | | | |")

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from pydantic import ValidationError
 
 from benchmarks.fccb.sets import TASKS, Answer, Case, CaseSet, Task, TrueCamera
 from worker.calibration.geometry.camera import Array, Camera, inside
@@ -25,6 +26,10 @@ WRONG_COSTS = 10
 SIGMAS = 3.0
 UNSEEN_PX = 1e4
 """How far off a marking counts that the answered camera does not see."""
+
+
+class AnswersError(Exception):
+    """Raised when a folder of answers cannot be scored; it says which file, and what was expected of it."""
 
 
 @dataclass(frozen=True)
@@ -76,13 +81,16 @@ COLUMNS = "score | right | accepted wrong | error, cm | within 3 sigma | stitch,
 
 
 def score(cases: CaseSet, answers: Path) -> dict[Task, TaskScore]:
-    """Score all answers to a set; a case without one counts as refused."""
+    """Score all answers to a set; a case without one counts as refused. Raises `AnswersError`."""
+    if not answers.is_dir():
+        raise AnswersError(f"expected a folder of answers, got {answers}, which is none")
+    named = {file.stem for file in answers.glob("*.json")}
+    if named and not named & {*cases.names}:
+        raise AnswersError(f"{answers} answers {min(named)} and others, and no case of {cases.folder}")
     judged: dict[Task, list[tuple[list[Verdict], list[float]]]] = {task: [] for task in TASKS}
     for name in cases.names:
         case = cases.case(name)
-        file = answers / f"{name}.json"
-        answer = Answer.model_validate_json(file.read_text()) if file.exists() else Answer(moments=[])
-        judged[case.task].append(_judge(case, cases, name, answer))
+        judged[case.task].append(_judge(case, cases, name, _answer(case, answers / f"{name}.json")))
     return {
         task: TaskScore(
             [v for verdicts, _ in of_task for v in verdicts], [cm for _, stitch in of_task for cm in stitch]
@@ -95,6 +103,21 @@ def score(cases: CaseSet, answers: Path) -> dict[Task, TaskScore]:
 def overall(scores: dict[Task, TaskScore]) -> float:
     """Return the mean of the tasks' points."""
     return float(np.mean([of_task.points for of_task in scores.values()]))
+
+
+def _answer(case: Case, file: Path) -> Answer:
+    """Read the answer to a case; one that is missing refuses it."""
+    if not file.exists():
+        return Answer(moments=[])
+    try:
+        answer = Answer.model_validate_json(file.read_text())
+    except ValidationError as error:
+        raise AnswersError(f"{file} is no answer: {error}") from error
+    known = {one.id for one in case.site.cameras}
+    for camera in (one.id for moment in answer.moments for one in moment.cameras):
+        if camera not in known:
+            raise AnswersError(f"{file} answers camera {camera}; the case has {', '.join(sorted(known))}")
+    return answer
 
 
 def _judge(case: Case, cases: CaseSet, name: str, answer: Answer) -> tuple[list[Verdict], list[float]]:

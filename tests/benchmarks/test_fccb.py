@@ -90,6 +90,25 @@ def test_a_case_without_an_answer_counts_as_refused(tmp_path):
     assert overall(score(cases, tmp_path / "answers")) == 0
 
 
+@pytest.mark.parametrize(
+    ("file", "answer", "words"),
+    [
+        ("one", "{", "one.json is no answer"),
+        ("one", '{"moments": [{"cameras": [{"id": "b", "accepted": false}]}]}', "answers camera b; the case has a"),
+        ("two", '{"moments": []}', "answers two and others, and no case of"),
+    ],
+)
+def test_answers_that_cannot_be_scored_are_named(tmp_path, file, answer, words):
+    a_set(tmp_path / "set", [camera("a", (0, -48, 10), (0, 0))])
+    answers = tmp_path / "answers"
+    with pytest.raises(SystemExit, match="expected a folder of answers"):
+        main(["score", str(tmp_path / "set"), str(answers)])
+    answers.mkdir()
+    (answers / f"{file}.json").write_text(answer)
+    with pytest.raises(SystemExit, match=words):
+        main(["score", str(tmp_path / "set"), str(answers)])
+
+
 def test_a_lens_of_the_answer_counts_in_place_of_the_cases(tmp_path):
     real = camera("a", (0, -48, 10), (0, 0))
     longer = camera("a", (0, -48, 10), (0, 0), focal=660.0)
