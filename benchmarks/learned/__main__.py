@@ -1,7 +1,7 @@
 """Train what `make bench` compares with: `python -m benchmarks.learned`.
 
-All nets that are asked for learn from the same batches; called again, it goes on where it stopped. The weights are written to
-`benchmarks/learned/trained`. Some three hours of one core, or twenty minutes of a machine with a GPU:
+All nets that are asked for learn from the same batches; called again, it goes on where it stopped. The weights are
+written to `benchmarks/learned/trained`. Some three hours of one core, or twenty minutes of a machine with a GPU:
 
     python -m benchmarks.learned --device cuda --workers 14
 """
