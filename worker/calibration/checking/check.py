@@ -335,12 +335,11 @@ class _Checker:
             self.pitch, given.camera, given.has_pose, reading, meant, found, None, is_resized, searched=searched
         )
 
-    def _lens(self, given: GivenCamera, resized: bool) -> Lens:
-        return given.resized if resized and given.resized is not None else given.camera.intrinsics
-
     def _meant(self, given: GivenCamera, reading: Reading, resized: bool) -> Camera:
         half_sides = np.array([self.pitch.length, self.pitch.width]) / 2
-        camera = given.camera.with_lens(self._lens(given, resized))
+        camera = given.camera
+        if resized and given.resized is not None:
+            camera = camera.with_lens(given.resized)
         return camera.with_pose(reading.pose(camera.pose, half_sides))
 
     def _zoomed(self, given: GivenCamera) -> SoughtCamera | None:

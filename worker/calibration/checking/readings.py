@@ -14,6 +14,7 @@ import numpy as np
 
 from worker.calibration.geometry.camera import Array, Pose
 from worker.calibration.geometry.rotation import rotation_vectors
+from worker.calibration.relocalisation.hypotheses import HALF_TURN
 
 Cause = Literal[
     "camera-to-world",
@@ -63,7 +64,7 @@ class Reading:
 
         On a field that half a turn does not change, another reading means the same without one.
         """
-        return np.array_equal(self.axes, np.diag([-1.0, -1.0, 1.0]))
+        return np.array_equal(self.axes, HALF_TURN)
 
     @property
     def words(self) -> tuple[str, ...]:
