@@ -2,8 +2,9 @@
 
 Even venues have one camera, odd ones two, tilted by 0 to 20 degrees; every third is equirectangular, the others are
 cylindrical. The search is given the sport, a frame of each camera, the kind of panorama and "180 degrees"; fields of
-view are 172 to 188 degrees, and vertical scales up to 3 % off. What is found is then moved by the paper's Start errors
-and calibrated. Every venue is a row in a file and not run again.
+view are 172 to 188 degrees, and vertical scales up to 3 % off. Where it asks on which side of the field a camera
+stands, it is told. What is found is then moved by the paper's Start errors and calibrated. Every venue is a row in a
+file and not run again.
 """
 
 from __future__ import annotations
@@ -23,11 +24,11 @@ from benchmarks.scenes import FOLDER, HOURS, Scene, rendered, seen_well, started
 from benchmarks.truth import apart, errors
 from models import MODEL_PATH
 from models.training.pitches.conditions import Conditions
-from service.schemas.find import SoughtCameraIn
+from service.schemas.find import FieldSide, SoughtCameraIn
 from testbed.synthetic import TAPED
 from worker.calibration.calibrate import calibrate
 from worker.calibration.detection.segmentation import Segmenter
-from worker.calibration.find_cameras import find_cameras
+from worker.calibration.find_cameras import FoundCameras, find_cameras
 from worker.calibration.gate.quality import CameraResult
 from worker.calibration.geometry.camera import Camera, Pose
 from worker.calibration.geometry.field import Field
@@ -94,10 +95,12 @@ def _judged(number: int) -> dict:
     there = venue(number)
     scene, segment = there.scene, Segmenter(MODEL_PATH, THREADS)
     begun = time.process_time()
-    asked = [SoughtCameraIn(id=one.id, panorama=there.model, field_of_view_deg=VIEW_DEG) for one in scene.cameras]
-    sought = [sought_camera(one, SIZE) for one in asked]
-    found = find_cameras(scene.pitch, sought, [], scene.frames, segment, number)
+    found = _found(there, None, segment, number)
+    is_side_asked = any(one.refusal is not None and "give its `side`" in one.refusal.words for one in found.cameras)
+    if is_side_asked:
+        found = _found(there, "near", segment, number)
     row = {
+        "is_side_asked": is_side_asked,
         "tilt_deg": STEEPEST_DEG * (number % 10) / 9,
         "model": there.model,
         "find_core_s": time.process_time() - begun,
@@ -114,6 +117,16 @@ def _judged(number: int) -> dict:
     except CalibrationError as error:
         return row | {"rejected": error.detail}
     return row | _calibrated(scene, said.cameras, said.rejected_because, said.stitch_error_px)
+
+
+def _found(there: Venue, side: FieldSide | None, segment: Segmenter, seed: int) -> FoundCameras:
+    """Search for the cameras of a venue, on a `side` of the field or on any."""
+    scene = there.scene
+    sought = [
+        sought_camera(SoughtCameraIn(id=one.id, panorama=there.model, field_of_view_deg=VIEW_DEG, side=side), SIZE)
+        for one in scene.cameras
+    ]
+    return find_cameras(scene.pitch, sought, [], scene.frames, segment, seed)
 
 
 def _on_the_near_side(cameras: Sequence[Camera]) -> list[Camera]:
@@ -147,6 +160,7 @@ def _table(rows: Sequence[dict]) -> Iterator[str]:
     yield table_head("venue | panorama | tilt | found | accepted | off, cm | off, sigma | lens, % | stitch, px (true)")
     for row in rows:
         found = "no" if row["refused"] else f"wrong: {row['wrong']}" if row["wrong"] else "yes"
+        found += ", told its side" if row["is_side_asked"] else ""
         accepted = "" if row["refused"] else row["rejected"] or "yes"
         stitch = "" if row.get("stitch_px") is None else f"{row['stitch_px']:.2f} ({row['true_stitch_px']:.2f})"
         yield (

@@ -30,7 +30,6 @@ from worker.calibration.relocalisation.sought import (
     Place,
     SoughtCamera,
     SoughtLens,
-    guessed_panoramas,
     lenses_of_view,
     panorama_of_view,
     unknown_lenses,
@@ -114,8 +113,8 @@ def sought_camera(camera: SoughtCameraIn, size: tuple[int, int]) -> SoughtCamera
         lens = lens_of(camera.intrinsics, list(size))
         if isinstance(lens, Panorama):
             sigma = free_lens_sigma(lens) | dict(lens.sigma)
-            guessed = guessed_panoramas(lens, sigma["fx"] / lens.focal_length_px)
-            return SoughtCamera(camera.id, guessed, place, ignored)
+            around = SoughtLens.around(lens, sigma["fx"] / lens.focal_length_px)
+            return SoughtCamera(camera.id, [around], place, ignored)
         known = SoughtLens.around(lens, lens.sigma.get("fx", 0.0) / lens.focal_length_px)
         return SoughtCamera(camera.id, [known], place, ignored)
     if camera.field_of_view_deg is not None:
@@ -133,7 +132,8 @@ def _is_stitched(size: tuple[int, int]) -> bool:
 def _panoramas(model: PanoramaModel, size: tuple[int, int], view_deg: float | None) -> list[SoughtLens]:
     """Return panoramas of about this field of view, or of a usual one."""
     uncertain = FIELD_OF_VIEW_UNCERTAIN if view_deg is None else PANORAMA_UNCERTAIN
-    return guessed_panoramas(panorama_of_view(size, PANORAMAS[model], view_deg or USUAL_PANORAMA_DEG), uncertain)
+    lens = panorama_of_view(size, PANORAMAS[model], view_deg or USUAL_PANORAMA_DEG)
+    return [SoughtLens.around(lens, uncertain)]
 
 
 def _known(camera: SoughtCameraIn) -> Camera:

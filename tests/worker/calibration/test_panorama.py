@@ -16,7 +16,7 @@ from worker.calibration.geometry.camera import Camera, Pose
 from worker.calibration.geometry.panorama import Cylindrical, Equirectangular
 from worker.calibration.geometry.visibility import VisibleLines
 from worker.calibration.records import Options
-from worker.calibration.relocalisation.sought import SoughtCamera, guessed_panoramas, panorama_of_view
+from worker.calibration.relocalisation.sought import SoughtCamera, SoughtLens, panorama_of_view
 from worker.calibration.rendering.overlays import overlay
 from worker.calibration.rendering.st_maps import NOWHERE, distorting, undistorting
 from worker.calibration.rendering.stitched_pictures import stitched
@@ -80,7 +80,7 @@ def test_a_panorama_of_unknown_lens_is_found_from_nothing():
     truth = panorama(view_deg=176.0)
     stretched = truth.intrinsics.matrix * [[1, 1, 1], [1, 1.02, 1], [1, 1, 1]]
     truth = truth.with_lens(replace(truth.intrinsics, matrix=stretched))
-    lenses = guessed_panoramas(panorama_of_view(SIZE, Cylindrical, 180.0), 0.03)
+    lenses = [SoughtLens.around(panorama_of_view(SIZE, Cylindrical, 180.0), 0.03)]
     frames = {"pan": [paint_frame(PITCH, truth)]}
     found = find_cameras(PITCH, [SoughtCamera("pan", lenses)], [], frames, sure_of_thin_lines, 1)
     (camera,) = found.cameras

@@ -8,7 +8,6 @@ from worker.calibration.relocalisation.field_map import FieldMap
 from worker.calibration.relocalisation.hypotheses import Hypotheses
 from worker.calibration.relocalisation.line_view import WIDTH_PX, LineView
 
-NEAREST_M = 0.3
 HALF_WIDTH_PX = WIDTH_PX / 2
 LOWEST_M = 1.2
 """Least height of a sought camera: from the ground everything can be explained by a few lines."""
@@ -46,14 +45,11 @@ def _expected_and_found(
     rotations = cameras.rotations.astype(np.float32)
     focal = cameras.focal_px.astype(np.float32)[:, None]
     moved = rotations @ field.points.T - (rotations @ cameras.positions[..., None].astype(np.float32))
-    depth = moved[:, 2]
-    ahead = depth > NEAREST_M
-    depth = np.where(ahead, depth, 1)
-    x, y = focal * moved[:, 0] / depth, focal * moved[:, 1] / depth
+    (x, y), ahead = view.surface.project((moved[:, 0], moved[:, 1], moved[:, 2]), focal)
     if cameras.bends.any():
         bent = cameras.bends.astype(np.float32)[:, None] * (x * x + y * y) / HALF_WIDTH_PX**2
         # Nothing is seen where a lens would bend the picture back.
-        ahead &= 3 * bent > -1
+        ahead = ahead & (3 * bent > -1)
         x, y = x * (1 + bent), y * (1 + bent)
     height, width = view.distance.shape
     # A plain number leaves the coordinates in single precision.
@@ -76,16 +72,17 @@ def _explained(field: FieldMap, view: LineView, cameras: Hypotheses, tolerance: 
     rotations = cameras.rotations.astype(np.float32)[..., None]
     positions = cameras.positions.astype(np.float32)[..., None]
     focal = cameras.focal_px.astype(np.float32)[:, None]
-    x, y = (straightened(view.places, cameras.bends) / focal[..., None]).transpose(2, 0, 1)
+    places = straightened(view.places, cameras.bends)
+    rays = view.surface.rays((places[..., 0], places[..., 1]), focal)
     # Axis by axis: arrays (P, M) that lie side by side in memory are several times as fast as one (P, M, 3).
-    ray = [rotations[:, 0, axis] * x + rotations[:, 1, axis] * y + rotations[:, 2, axis] for axis in range(3)]
+    ray = [sum(rotations[:, own, axis] * along for own, along in enumerate(rays)) for axis in range(3)]
     down = ray[2] < -1e-3
     depth = np.where(down, -positions[:, 2] / np.where(down, ray[2], -1), 0)
     beside, on_map = field.to_paint(positions[:, 0] + depth * ray[0], positions[:, 1] + depth * ray[1])
     # From metres on the ground to pixels: the derivative of the projection along the way to the nearest paint.
-    turned = [rotations[:, axis, 0] * beside[0] + rotations[:, axis, 1] * beside[1] for axis in range(3)]
+    x, y, z = (rotations[:, axis, 0] * beside[0] + rotations[:, axis, 1] * beside[1] for axis in range(3))
     scale = focal / np.maximum(depth, 0.1)
-    across, along = turned[0] - x * turned[2], turned[1] - y * turned[2]
+    across, along = view.surface.moves(rays, (x, y, z))
     off = (scale / tolerance) ** 2 * (across * across + along * along)
     return np.asarray(np.where(down & on_map, np.exp(-off), 0).mean(axis=1))
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from worker.calibration.geometry.camera import Array
 from worker.calibration.geometry.rotation import rotation_matrices
-from worker.calibration.relocalisation.agreement import HALF_WIDTH_PX, NEAREST_M, agreement
+from worker.calibration.relocalisation.agreement import HALF_WIDTH_PX, agreement
 from worker.calibration.relocalisation.field_map import FieldMap
 from worker.calibration.relocalisation.hypotheses import FARTHEST_BENT, Hypotheses, LensSteps
 from worker.calibration.relocalisation.line_view import LineView
@@ -36,9 +36,8 @@ def _stepped(field: FieldMap, view: LineView, cameras: Hypotheses, tolerance_px:
     """Return each hypothesis after one step: of rotation (3), place in its own axes (3), log focal length and bend."""
     focal = cameras.focal_px[:, None]
     ahead_of = np.einsum("pij,pnj->pni", cameras.rotations, field.points[None] - cameras.positions[:, None])
-    ahead = ahead_of[..., 2] > NEAREST_M
-    depth = np.where(ahead, ahead_of[..., 2], 1.0)
-    seen = focal[..., None] * ahead_of[..., :2] / depth[..., None]
+    places, ahead = view.surface.project((ahead_of[..., 0], ahead_of[..., 1], ahead_of[..., 2]), focal)
+    seen = np.stack(places, axis=-1)
     outwards = (seen * seen).sum(axis=-1) / HALF_WIDTH_PX**2
     bent = seen * (1 + cameras.bends[:, None] * outwards)[..., None]
 
@@ -51,13 +50,12 @@ def _stepped(field: FieldMap, view: LineView, cameras: Hypotheses, tolerance_px:
     # Standard deviation of a point of paint measured across its line, view pixels: neighbours share errors.
     weights = np.where(counted, np.exp(-((to_paint**2).sum(axis=-1) / tolerance_px**2)), 0.0) / 2.0**2
 
-    push = np.concatenate([focal[..., None] * across, -(seen * across).sum(axis=-1, keepdims=True)], axis=-1)
-    push /= depth[..., None]
+    push = view.surface.pulls(ahead_of, across, focal)
     radial = (seen * across).sum(axis=-1)
     # A known lens parameter has a Jacobian of 0, and so stays exactly as it is.
     of_lens = np.stack([radial * (lens.focal > 0), radial * outwards * (lens.bend > 0)], axis=-1)
     jacobian = np.concatenate([np.cross(ahead_of, push), push, of_lens], axis=-1)
-    reach = (depth * counted).sum(axis=1) / np.maximum(counted.sum(axis=1), 1)
+    reach = (np.abs(ahead_of[..., 2]) * counted).sum(axis=1) / np.maximum(counted.sum(axis=1), 1)
     # Without counted points nothing is measured, and the step is none.
     reach = np.where(reach > 0, reach, 1.0)
     spread = np.empty((len(cameras), 8))

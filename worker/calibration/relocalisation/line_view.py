@@ -1,4 +1,4 @@
-"""Lines of a frame without the distortion of its lens: segments, places on paint, distances to paint."""
+"""Lines of a frame as its lens lays them out: segments, places on paint, distances to paint."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from worker.calibration.geometry.camera import Array
 from worker.calibration.geometry.lens import Lens
+from worker.calibration.relocalisation.view_surface import ViewSurface, surface_of
 
 WIDTH_PX = 480
 """Width of a frame in view pixels: hypotheses differ by as little as half a pixel of it."""
@@ -16,15 +17,16 @@ WIDTH_PX = 480
 
 @dataclass(frozen=True)
 class LineView:
-    """Lines of one frame in view pixels: undistorted, origin in the principal point, x right, y down.
+    """Lines of one frame in view pixels on a `surface`: undistorted, origin in the principal point, x right, y down.
 
-    `focal_px`: of the lens that undistorted it, in view pixels; another focal length f sees the same picture along rays
-    (x / f, y / f, 1). `places` (M, 2) on the middles of paint; `painted_px`: their length in all; `distance` (H, W) to
-    the nearest of them, which is at `nearest` (H, W, 2), column and row, and `covered` (H, W) what the frame covers,
-    from `corner` (2,) on; `starts`, `ends` (S, 2) of straight segments. `roll_sigma`: how far from level the camera may
-    be rolled, rad, one standard deviation.
+    `focal_px`: of the lens that undistorted it, in view pixels; another focal length f sees the same picture along
+    other rays, on a plane (x / f, y / f, 1). `places` (M, 2) on the middles of paint; `painted_px`: their length in
+    all; `distance` (H, W) to the nearest of them, which is at `nearest` (H, W, 2), column and row, and `covered` (H, W)
+    what the frame covers, from `corner` (2,) on; `starts`, `ends` (S, 2) of straight segments. `roll_sigma`: how far
+    from level the camera may be rolled, rad, one standard deviation.
     """
 
+    surface: ViewSurface
     focal_px: float
     frame_px: float
     places: NDArray[np.float32]
@@ -46,13 +48,14 @@ class LineView:
         small = np.asarray(
             cv2.resize(response, (2 * WIDTH_PX, round(2 * height * scale)), interpolation=cv2.INTER_AREA), np.uint8
         )
-        border = _border(lens) * focal
+        surface = surface_of(lens)
+        border = surface.outline() * focal
         # Limit of undistorted views from the principal point, in widths of a frame.
         widest = 1.3
         low = np.maximum(border.min(axis=0), -widest * WIDTH_PX)
         high = np.minimum(border.max(axis=0), widest * WIDTH_PX)
         shape = tuple(np.floor(high - low).astype(int)[::-1] + 1)
-        cells = _cells(_undistorted(middles_of_paint(small) / (2 * scale), lens, focal) - low, shape)
+        cells = _cells(_laid_out(middles_of_paint(small) / (2 * scale), surface, focal) - low, shape)
         free = np.ones(shape, np.uint8)
         free[cells[:, 1], cells[:, 0]] = 0
         covered = np.zeros(shape, np.uint8)
@@ -60,8 +63,9 @@ class LineView:
         distance, label = cv2.distanceTransformWithLabels(free, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
         # Number of places on paint that each pose of a population projects to the ground.
         chosen = np.random.default_rng(1).permutation(len(cells))[:320]
-        starts, ends = _segments(small, lens, focal, 2 * scale)
+        starts, ends = _segments(small, surface, focal, 2 * scale)
         return cls(
+            surface,
             focal,
             1 / scale,
             (cells[chosen] + low).astype(np.float32),
@@ -95,25 +99,14 @@ class LineView:
 
         For focal lengths (...).
         """
-        (x, y), (other_x, other_y) = self.starts.T, self.ends.T
-        beyond = (x * other_y - y * other_x) / focal_px[..., None]
-        normal = np.stack(np.broadcast_arrays(y - other_y, other_x - x, beyond), axis=-1)
+        normal = self.surface.normals(self.starts, self.ends, focal_px)
         return np.asarray(normal / np.linalg.norm(normal, axis=-1, keepdims=True))
 
 
-def _border(lens: Lens) -> Array:
-    """Return rays (n, 2) around what a lens sees: along the border of its picture, or nearer where it folds before."""
-    centre = lens.matrix[:2, 2]
-    shares = np.linspace(1.0, 0.05, 20)[:, None, None]
-    rays = lens.undistort(centre + shares * (lens.border(60) - centre))
-    outermost = np.argmax(np.isfinite(rays).all(axis=-1), axis=0)
-    return np.asarray(rays[outermost, np.arange(rays.shape[1])])
-
-
-def _undistorted(pixels: Array, lens: Lens, focal: float) -> Array:
+def _laid_out(pixels: Array, surface: ViewSurface, focal: float) -> Array:
     """Return pixels (n, 2) of a frame in view pixels; those without a ray are left out."""
-    plane = lens.undistort(pixels) * focal
-    return np.asarray(plane[np.isfinite(plane).all(axis=-1)])
+    places = surface.lay_out(pixels) * focal
+    return np.asarray(places[np.isfinite(places).all(axis=-1)])
 
 
 def labelled_places(label: NDArray[Any], free: NDArray[np.uint8]) -> NDArray[np.float32]:
@@ -140,11 +133,11 @@ def _cells(places: Array, shape: tuple[int, ...]) -> NDArray[np.intp]:
     return np.unique(cells[within], axis=0)
 
 
-def _segments(small: NDArray[np.uint8], lens: Lens, focal: float, scale: float) -> tuple[Array, Array]:
+def _segments(small: NDArray[np.uint8], surface: ViewSurface, focal: float, scale: float) -> tuple[Array, Array]:
     """Return starts and ends (S, 2) of the longest straight segments, view pixels (von Gioi et al., LSD, 2012)."""
     found = cv2.createLineSegmentDetector(cv2.LSD_REFINE_STD).detect(small)[0]
     pixels = (np.zeros((0, 4)) if found is None else found.reshape(-1, 4)) / scale
-    starts, ends = (lens.undistort(pixels[:, part]) * focal for part in (slice(0, 2), slice(2, 4)))
+    starts, ends = (surface.lay_out(pixels[:, part].astype(float)) * focal for part in (slice(0, 2), slice(2, 4)))
     length = np.linalg.norm(ends - starts, axis=1)
     longest = np.argsort(-np.nan_to_num(length))[:140]
     longest = longest[np.nan_to_num(length[longest]) >= 10.0]

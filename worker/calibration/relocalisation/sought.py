@@ -28,15 +28,13 @@ LARGEST_KNOWN = 0.02
 class SoughtLens:
     """Lens through which a frame may have been taken, with a focal length between `shortest_px` and `longest_px`.
 
-    `is_bend_known`: True if it bends the picture as `lens` does, False if only about so; `is_guess`: True for one of
-    several lenses that are close enough to the true one for a pose to be found, and then the lens with it.
+    `is_bend_known`: True if it bends the picture as `lens` does, False if only about so.
     """
 
     lens: Lens
     shortest_px: float
     longest_px: float
     is_bend_known: bool = True
-    is_guess: bool = False
 
     @classmethod
     def known(cls, lens: Lens) -> "SoughtLens":
@@ -48,8 +46,6 @@ class SoughtLens:
         """Return a lens with this relative sigma of its focal length, which a small one makes known."""
         if uncertain <= LARGEST_KNOWN:
             return cls.known(lens)
-        if isinstance(lens, Panorama):
-            return replace(cls.known(lens), is_guess=True)
         reach = 1 + 2.0 * uncertain
         return cls(lens, lens.focal_length_px / reach, lens.focal_length_px * reach)
 
@@ -111,7 +107,7 @@ class SoughtCamera:
     @property
     def is_lens_sought(self) -> bool:
         """True if the lens is to be found along with the pose."""
-        return any(one.is_guess or not one.is_known for one in self.lenses)
+        return any(not one.is_known for one in self.lenses)
 
 
 def unknown_lenses(size: tuple[int, int], bends: Sequence[float] = BENDS) -> list[SoughtLens]:
@@ -136,19 +132,6 @@ def panorama_of_view(size: tuple[int, int], model: type[Panorama], field_of_view
     focal = width / float(np.radians(field_of_view_deg))
     matrix = np.array([[focal, 0.0, (width - 1) / 2], [0.0, focal, (height - 1) / 2], [0.0, 0.0, 1.0]])
     return model(matrix, np.zeros(0), size)
-
-
-def guessed_panoramas(lens: Panorama, uncertain: float) -> list[SoughtLens]:
-    """Return guesses at a panorama with this relative sigma of its focal length, which bends lines as no other does."""
-    if uncertain <= LARGEST_KNOWN:
-        return [SoughtLens.known(lens)]
-    # Ratio of neighbours: of two poses through them, one is caught by the lines through the true lens.
-    steps = int(np.ceil(np.log(1 + 2 * uncertain) / np.log(1.06)))
-    zooms = (1 + 2 * uncertain) ** np.linspace(-1, 1, 2 * steps + 1)
-    return [
-        SoughtLens.around(replace(lens, matrix=lens.matrix * [[zoom, 1, 1], [1, zoom, 1], [1, 1, 1]]), uncertain)
-        for zoom in zooms
-    ]
 
 
 def _bent(size: tuple[int, int], focal: float, bend: float) -> Intrinsics:
