@@ -73,16 +73,16 @@ def _explained(field: FieldMap, view: LineView, cameras: Hypotheses, tolerance: 
     positions = cameras.positions.astype(np.float32)[..., None]
     focal = cameras.focal_px.astype(np.float32)[:, None]
     places = straightened(view.places, cameras.bends)
-    rays = view.surface.rays((places[..., 0], places[..., 1]), focal)
+    seen = x, y, z = view.surface.rays((places[..., 0], places[..., 1]), focal)
     # Axis by axis: arrays (P, M) that lie side by side in memory are several times as fast as one (P, M, 3).
-    ray = [sum(rotations[:, own, axis] * along for own, along in enumerate(rays)) for axis in range(3)]
+    ray = [rotations[:, 0, axis] * x + rotations[:, 1, axis] * y + rotations[:, 2, axis] * z for axis in range(3)]
     down = ray[2] < -1e-3
     depth = np.where(down, -positions[:, 2] / np.where(down, ray[2], -1), 0)
     beside, on_map = field.to_paint(positions[:, 0] + depth * ray[0], positions[:, 1] + depth * ray[1])
     # From metres on the ground to pixels: the derivative of the projection along the way to the nearest paint.
-    x, y, z = (rotations[:, axis, 0] * beside[0] + rotations[:, axis, 1] * beside[1] for axis in range(3))
+    moved = tuple(rotations[:, axis, 0] * beside[0] + rotations[:, axis, 1] * beside[1] for axis in range(3))
     scale = focal / np.maximum(depth, 0.1)
-    across, along = view.surface.moves(rays, (x, y, z))
+    across, along = view.surface.moves(seen, moved)
     off = (scale / tolerance) ** 2 * (across * across + along * along)
     return np.asarray(np.where(down & on_map, np.exp(-off), 0).mean(axis=1))
 

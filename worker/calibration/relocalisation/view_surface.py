@@ -40,7 +40,7 @@ class ViewSurface(ABC):
 
     @abstractmethod
     def rays(self, places: Places, focal_px: Plane) -> Points:
-        """Return points that are seen at places."""
+        """Return points that are seen at places; coordinates that all of them share once."""
 
     @abstractmethod
     def moves(self, rays: Points, by: Points) -> Places:
@@ -88,7 +88,7 @@ class PlaneSurface(ViewSurface):
     def rays(self, places: Places, focal_px: Plane) -> Points:
         """Return points at depth 1."""
         x, y = (place / focal_px for place in places)
-        return x, y, np.ones_like(x)
+        return x, y, np.ones((1,) * x.ndim, x.dtype)
 
     def moves(self, rays: Points, by: Points) -> Places:
         """Return the moves of points at depth 1."""
