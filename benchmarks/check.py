@@ -182,6 +182,7 @@ def _checked(view: View, way: str) -> dict:
         "grade_right": found.grade == spoiled.grade,
         "cause_right": set(causes) == spoiled.causes,
         "off_px": found.off_px,
+        "sigma_px": found.sigma_px,
         "core_s": time.process_time() - begin,
     }
 

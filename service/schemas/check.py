@@ -55,7 +55,7 @@ class CameraCheck(Schema):
 
     id: Id = Field(description="Id of the camera.")
     grade: Annotated[Grade, OPEN_WORD] = Field(description="Grade of the camera.")
-    causes: list[CheckCause] = Field(description="Causes of the grade.")
+    causes: list[CheckCause] = Field(description="Causes of the grade; beside a good one, faults where no marking is.")
     off_px: float | None = Field(description="Mean shift of the markings in view, pixels.")
     sigma_px: float | None = Field(description="One standard deviation of it, pixels.")
     off_m: float | None = Field(description="Shift of the farthest marking in view, m on the ground.")

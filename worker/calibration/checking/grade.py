@@ -50,7 +50,8 @@ class GradedCamera:
 def grade(checked: CheckedCamera, lens_folds: str | None) -> GradedCamera:
     """Return the grade of a camera; `lens_folds`: words about a lens that has no rays for a part of the picture.
 
-    A lens that folds where no marking is does no harm: the frame is explained through it.
+    A lens that folds where no marking is does no harm there: the frame is explained through it. It is named all the
+    same beside a good grade, which speaks of the markings alone.
     """
     folds: list[tuple[CauseOfGrade, str]] = [] if lens_folds is None else [("folds", lens_folds)]
     found = checked.found
@@ -73,7 +74,9 @@ def grade(checked: CheckedCamera, lens_folds: str | None) -> GradedCamera:
         since += _changes(checked, found.camera, tolerance, lens_is_wrong=bool(harmful))
     if written or any(cause in ("other-place", "other-lens") for cause, _ in since):
         return GradedCamera(checked, "wrong", [*written, *since], difference)
-    return GradedCamera(checked, "drifted" if since else "good", since, difference)
+    if since:
+        return GradedCamera(checked, "drifted", since, difference)
+    return GradedCamera(checked, "good", folds, difference)
 
 
 def _not_found(checked: CheckedCamera, folds: list[tuple[CauseOfGrade, str]]) -> GradedCamera:
