@@ -49,6 +49,8 @@ READINGS_AT, SEARCH_AT = 0.1, 0.4
 """Shares of the whole at which readings and searches begin, if they do: by the core-seconds of a zoomed pair."""
 ZOOM_UNCERTAIN = 0.25
 """Relative sigma of a focal length that somebody may have zoomed."""
+INEXACT = frozenset({"residual", "undetermined"})
+"""Reasons of the gate against poses that explain their frames."""
 OF_THE_FRAME = frozenset({"dark", "fogged", "blinded", "snow", "out-of-focus"})
 """Causes for which a frame shows nothing by any pose. That of a blocked view may be the ground that a wrong pose takes
 for the field."""
@@ -141,7 +143,10 @@ def good_within_px(camera: Camera) -> float:
 
 @dataclass
 class _Checker:
-    """Course of a check: the cameras that are `settled`, and why the others are not (`refusals`)."""
+    """Course of a check: the cameras that are `settled`, and why the others are not (`refusals`).
+
+    `explained`: those whose frames show their lines where the file at its word leads, though not exactly enough.
+    """
 
     pitch: Field
     given: Mapping[str, GivenCamera]
@@ -151,12 +156,18 @@ class _Checker:
     settled: dict[str, CheckedCamera] = field(default_factory=dict)
     refusals: dict[str, str] = field(default_factory=dict)
     unusable: set[str] = field(default_factory=set)
+    explained: set[str] = field(default_factory=set)
     _responses: dict[str, NDArray[np.uint8]] = field(default_factory=dict)
 
     @property
     def open(self) -> list[GivenCamera]:
         """Cameras that are not settled and whose frames can be used."""
         return [one for id, one in self.given.items() if id not in self.settled and id not in self.unusable]
+
+    @property
+    def lost(self) -> list[GivenCamera]:
+        """Open cameras that may look elsewhere."""
+        return [one for one in self.open if one.camera.id not in self.explained]
 
     def calibrate_as(self, reading: Reading, *, resized: bool) -> None:
         """Calibrate the open cameras from where a reading of the file puts them, and settle those that are accepted."""
@@ -168,6 +179,8 @@ class _Checker:
                 self._settle(id, reading, meant[id], result, resized=resized)
             elif not result.view.usable and result.view.cause in OF_THE_FRAME:
                 self.unusable.add(id)
+            elif reading is TAKEN_AT_ITS_WORD and _is_inexact(result):
+                self.explained.add(id)
 
     def calibrate_reordered(self) -> None:
         """Settle the cameras that stand where the file puts them if its coefficients are k1, k2, k3, p1, p2.
@@ -221,13 +234,13 @@ class _Checker:
 
     def calibrate_turned(self) -> None:
         """Calibrate the open cameras where they stand, whatever way they look."""
-        cameras = [one.camera for one in self.open if one.has_pose and films_the_field(self.pitch, one.camera)]
+        cameras = [one.camera for one in self.lost if one.has_pose and films_the_field(self.pitch, one.camera)]
         for result in self._calibrated(cameras, "accept"):
             if result.accepted:
                 self._settle(result.camera.id, TAKEN_AT_ITS_WORD, self.given[result.camera.id].camera, result)
 
     def search(self) -> None:
-        """Search for the open cameras: zoomed where they stand, anywhere, and through another lens."""
+        """Search for the open cameras: zoomed where they stand, anywhere if they may, and through another lens."""
         ways: dict[Search, Callable[[GivenCamera], SoughtCamera | None]] = {
             "zoomed": self._zoomed,
             "anywhere": self._anywhere,
@@ -349,7 +362,9 @@ class _Checker:
         place = Place(position=given.camera.pose.position, radius_m=ON_ITS_MOUNT_M)
         return SoughtCamera(given.camera.id, [lens], place, roll_sigma_deg=KNOCKED_ROLL_DEG)
 
-    def _anywhere(self, given: GivenCamera) -> SoughtCamera:
+    def _anywhere(self, given: GivenCamera) -> SoughtCamera | None:
+        if given.camera.id in self.explained:
+            return None
         return SoughtCamera(given.camera.id, [SoughtLens.known(given.camera.intrinsics)], ANYWHERE)
 
     def _through_another_lens(self, given: GivenCamera) -> SoughtCamera | None:
@@ -357,6 +372,11 @@ class _Checker:
             return None
         place = Place(position=given.camera.pose.position, radius_m=ON_ITS_MOUNT_M)
         return SoughtCamera(given.camera.id, unknown_lenses(given.camera.intrinsics.size), place)
+
+
+def _is_inexact(result: CameraResult) -> bool:
+    """True if a pose explains its frame and is refused for how exactly."""
+    return result.is_explained and result.refusal is not None and result.refusal.reason in INEXACT
 
 
 def _views(cameras: Sequence[Camera], responses: Sequence[NDArray[np.uint8]]) -> list[LineView]:
