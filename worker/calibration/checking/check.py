@@ -22,7 +22,7 @@ from worker.calibration.detection.evidence import TOLERANCE_PX
 from worker.calibration.detection.segmentation import whole_frame
 from worker.calibration.field_fit.measures import fit_field
 from worker.calibration.find_cameras import find_cameras
-from worker.calibration.gate.quality import CameraResult
+from worker.calibration.gate.quality import CameraResult, alone_rejection
 from worker.calibration.geometry.camera import Camera, Frame
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.lens import Lens
@@ -40,6 +40,7 @@ from worker.calibration.relocalisation.sought import (
     SoughtLens,
     unknown_lenses,
 )
+from worker.calibration.robust import SURE
 
 Search = Literal["zoomed", "anywhere", "lens"]
 TAKEN_AT_ITS_WORD = Reading((), 1.0, np.eye(3), np.eye(3), (0, 0))
@@ -49,7 +50,7 @@ READINGS_AT, SEARCH_AT = 0.1, 0.4
 """Shares of the whole at which readings and searches begin, if they do: by the core-seconds of a zoomed pair."""
 ZOOM_UNCERTAIN = 0.25
 """Relative sigma of a focal length that somebody may have zoomed."""
-INEXACT = frozenset({"residual", "undetermined"})
+INEXACT = frozenset({"residual", "zoomed", "undetermined"})
 """Reasons of the gate against poses that explain their frames."""
 OF_THE_FRAME = frozenset({"dark", "fogged", "blinded", "snow", "out-of-focus"})
 """Causes for which a frame shows nothing by any pose. That of a blocked view may be the ground that a wrong pose takes
@@ -90,6 +91,18 @@ class CheckedCamera:
         """Mean shift of the markings in view from where it was meant to be to where it was found, or infinite."""
         assert self.found is not None
         return shift_px(self.pitch, self.meant, self.found.camera)
+
+    @property
+    def sigma_px(self) -> float | None:
+        """One standard deviation (rms) of the markings in view where it was found; None where nothing tells it."""
+        assert self.found is not None
+        known = self.found.ground_sigma
+        return None if known is None else float(np.sqrt(np.mean(known.pixels**2)))
+
+    @property
+    def tolerance_px(self) -> float:
+        """Largest shift of the markings of a good calibration."""
+        return max(good_within_px(self.meant), SURE * (self.sigma_px or 0.0))
 
     @property
     def is_clearly_wrong(self) -> bool:
@@ -170,17 +183,24 @@ class _Checker:
         return [one for one in self.open if one.camera.id not in self.explained]
 
     def calibrate_as(self, reading: Reading, *, resized: bool) -> None:
-        """Calibrate the open cameras from where a reading of the file puts them, and settle those that are accepted."""
+        """Calibrate the open cameras from where a reading of the file puts them, and settle those that are accepted.
+
+        Lines may lie farther from what the file says at its word than from a pose that is to be stored: it is asked
+        where the markings are.
+        """
         meant = {one.camera.id: self._meant(one, reading, resized) for one in self.open if one.has_pose}
         filming = [camera for camera in meant.values() if films_the_field(self.pitch, camera)]
         for result in self._calibrated(filming, "never"):
             id = result.camera.id
+            checked = self._checked(id, reading, meant[id], result, resized=resized)
             if result.accepted:
-                self._settle(id, reading, meant[id], result, resized=resized)
+                self.settled[id] = checked
             elif not result.view.usable and result.view.cause in OF_THE_FRAME:
                 self.unusable.add(id)
             elif reading is TAKEN_AT_ITS_WORD and _is_inexact(result):
                 self.explained.add(id)
+                if checked.moved_px <= checked.tolerance_px and _passes_through_its_lens(result):
+                    self.settled[id] = checked
 
     def calibrate_reordered(self) -> None:
         """Settle the cameras that stand where the file puts them if its coefficients are k1, k2, k3, p1, p2.
@@ -237,7 +257,8 @@ class _Checker:
         cameras = [one.camera for one in self.lost if one.has_pose and films_the_field(self.pitch, one.camera)]
         for result in self._calibrated(cameras, "accept"):
             if result.accepted:
-                self._settle(result.camera.id, TAKEN_AT_ITS_WORD, self.given[result.camera.id].camera, result)
+                id = result.camera.id
+                self.settled[id] = self._checked(id, TAKEN_AT_ITS_WORD, self.given[id].camera, result)
 
     def search(self) -> None:
         """Search for the open cameras: zoomed where they stand, anywhere if they may, and through another lens."""
@@ -256,7 +277,7 @@ class _Checker:
             for result in self._calibrated(found, "never"):
                 if result.accepted:
                     given = self.given[result.camera.id].camera
-                    self._settle(given.id, TAKEN_AT_ITS_WORD, given, result, searched=way)
+                    self.settled[given.id] = self._checked(given.id, TAKEN_AT_ITS_WORD, given, result, searched=way)
 
     def result(self, id: str) -> CheckedCamera:
         """Return the answer for a camera."""
@@ -332,7 +353,7 @@ class _Checker:
                 self.refusals.setdefault(result.camera.id, result.rejected_because)
         return found.cameras
 
-    def _settle(
+    def _checked(
         self,
         id: str,
         reading: Reading,
@@ -341,10 +362,10 @@ class _Checker:
         *,
         resized: bool = False,
         searched: Search | None = None,
-    ) -> None:
+    ) -> CheckedCamera:
         given = self.given[id]
         is_resized = given.is_resized or (resized and given.resized is not None)
-        self.settled[id] = CheckedCamera(
+        return CheckedCamera(
             self.pitch, given.camera, given.has_pose, reading, meant, found, None, is_resized, searched=searched
         )
 
@@ -377,6 +398,11 @@ class _Checker:
 def _is_inexact(result: CameraResult) -> bool:
     """True if a pose explains its frame and is refused for how exactly."""
     return result.is_explained and result.refusal is not None and result.refusal.reason in INEXACT
+
+
+def _passes_through_its_lens(result: CameraResult) -> bool:
+    """True if nothing speaks against a pose but that its lines would fit better through a slightly other lens."""
+    return alone_rejection(replace(result, residual_px=0.0, zoom=None)) is None
 
 
 def _views(cameras: Sequence[Camera], responses: Sequence[NDArray[np.uint8]]) -> list[LineView]:

@@ -6,14 +6,13 @@ from typing import Literal
 import numpy as np
 
 from worker.calibration.checking.changes import Change, fewest_changes
-from worker.calibration.checking.check import CheckedCamera, good_within_px
+from worker.calibration.checking.check import CheckedCamera
 from worker.calibration.checking.readings import Cause
 from worker.calibration.gate.displacement import measure_displacement
 from worker.calibration.gate.quality import CameraResult, Moved
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.derivatives import POSE_NUMBERS
 from worker.calibration.geometry.lens import LENS_PARAMETERS
-from worker.calibration.robust import SURE
 
 Grade = Literal["good", "drifted", "wrong", "cannot-tell"]
 CauseOfGrade = (
@@ -61,17 +60,16 @@ def grade(checked: CheckedCamera, lens_folds: str | None) -> GradedCamera:
         said: list[tuple[CauseOfGrade, str]] = [("no-pose", "the file has a lens and no pose; one was found")]
         return GradedCamera(checked, "cannot-tell", [*folds, *said], None)
     difference = _difference(checked, found)
-    tolerance = max(good_within_px(checked.meant), SURE * (difference.sigma_pixels or 0.0))
     written: list[tuple[CauseOfGrade, str]] = [*zip(checked.reading.causes, checked.reading.words, strict=True)]
     if checked.is_resized:
         written.append(("other-resolution", "its lens is for pictures of another resolution"))
     if checked.is_reordered:
         written.append(("distortion-order", "its coefficients are k1, k2, k3, p1, p2 and not k1, k2, p1, p2, k3"))
     since: list[tuple[CauseOfGrade, str]] = []
-    if difference.pixels > tolerance:
+    if difference.pixels > checked.tolerance_px:
         harmful = folds if checked.searched == "lens" else []
         written += harmful
-        since += _changes(checked, found.camera, tolerance, lens_is_wrong=bool(harmful))
+        since += _changes(checked, found.camera, lens_is_wrong=bool(harmful))
     if written or any(cause in ("other-place", "other-lens") for cause, _ in since):
         return GradedCamera(checked, "wrong", [*written, *since], difference)
     if since:
@@ -88,20 +86,17 @@ def _not_found(checked: CheckedCamera, folds: list[tuple[CauseOfGrade, str]]) ->
 
 def _difference(checked: CheckedCamera, found: CameraResult) -> Difference:
     ground = measure_displacement(checked.pitch, checked.meant, found)
-    sigma = None if found.ground_sigma is None else float(np.sqrt(np.mean(found.ground_sigma.pixels**2)))
     return Difference(
         checked.moved_px,
-        sigma,
+        checked.sigma_px,
         None if ground is None else float(np.hypot(*ground.shift)),
         None if ground is None else float(np.hypot(*ground.sigma)),
     )
 
 
-def _changes(
-    checked: CheckedCamera, now: Camera, tolerance_px: float, *, lens_is_wrong: bool
-) -> list[tuple[CauseOfGrade, str]]:
+def _changes(checked: CheckedCamera, now: Camera, *, lens_is_wrong: bool) -> list[tuple[CauseOfGrade, str]]:
     """Return what happened to a camera since, or what else is wrong, and no more than explains the markings in view."""
-    pitch, meant = checked.pitch, checked.meant
+    pitch, meant, tolerance_px = checked.pitch, checked.meant, checked.tolerance_px
     if checked.searched == "anywhere" and Moved.between(pitch, meant, now).exceeds_limits:
         x, y, z = now.pose.position
         where = f"({x:.1f}, {y:.1f}, {z:.1f}) m"

@@ -6,8 +6,8 @@ from unittest.mock import patch
 
 import pytest
 
-from testbed.synthetic import PITCH, paint_frame
-from tests.worker.calibration.gate.good_result import LEFT, good, seen
+from testbed.synthetic import PITCH, moved, paint_frame
+from tests.worker.calibration.gate.good_result import LEFT, good, on_ground, seen
 from tests.worker.calibration.outdated_pair import white_on_green
 from worker.calibration.checking import check
 from worker.calibration.gate.quality import Refusal
@@ -15,8 +15,8 @@ from worker.calibration.gate.quality import Refusal
 pytestmark = pytest.mark.slow
 
 
-def searches_after(result):
-    """What each search of a check knows of its camera's place, if every calibration ends with this result."""
+def checked_with(result):
+    """A camera and what each search of its check knows of its place, if every calibration ends with this result."""
     searched = []
 
     def search(pitch, sought, *_):
@@ -29,16 +29,33 @@ def searches_after(result):
     ):
         frames = {LEFT.id: [paint_frame(PITCH, LEFT)]}
         (checked,) = check.check_cameras(PITCH, [check.GivenCamera(LEFT)], frames, white_on_green)
-    assert checked.found is None
-    return searched
+    return checked, searched
+
+
+def refused(reason, **changes):
+    return replace(good(), refusal=Refusal(reason, "its lines lie too far off"), **changes)
 
 
 def test_a_camera_that_is_lost_is_searched_everywhere():
-    lost = replace(good(), evidence=seen(0.3), refusal=Refusal("lines", "its lines are not seen"))
-    assert searches_after(lost) == ["on its mount", "anywhere", "on its mount"]
+    checked, searched = checked_with(refused("lines", evidence=seen(0.3)))
+    assert searched == ["on its mount", "anywhere", "on its mount"]
+    assert checked.found is None
 
 
-@pytest.mark.parametrize("reason", ["residual", "undetermined"])
-def test_a_camera_whose_frame_is_explained_is_searched_only_through_other_lenses(reason):
-    inexact = replace(good(), refusal=Refusal(reason, "its lines lie too far off"))
-    assert searches_after(inexact) == ["on its mount", "on its mount"]
+@pytest.mark.parametrize("reason", ["residual", "zoomed", "undetermined"])
+def test_a_camera_that_turned_and_whose_frame_is_explained_is_searched_only_through_other_lenses(reason):
+    checked, searched = checked_with(refused(reason, camera=moved(LEFT, (0.02, 0.0, 0.0))))
+    assert searched == ["on its mount", "on its mount"]
+    assert checked.found is None
+
+
+@pytest.mark.parametrize("reason", ["residual", "zoomed"])
+def test_where_the_markings_lie_is_told_without_the_exactness_of_a_pose_that_is_stored(reason):
+    checked, searched = checked_with(refused(reason, residual_px=9.0))
+    assert searched == []
+    assert checked.moved_px < 1e-9
+
+
+def test_a_pose_that_the_lines_leave_open_is_no_answer():
+    checked, _ = checked_with(refused("undetermined", ground_sigma=on_ground(1.0, 9.0)))
+    assert checked.found is None
