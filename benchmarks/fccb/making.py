@@ -24,7 +24,7 @@ from benchmarks.fccb.sets import (
 from benchmarks.fields.rendered import GROUNDS, LEAST_SHOWN, overlapping_cameras, random_camera, take_shot, usual_field
 from benchmarks.scenes import as_built, seen_well
 from demo.render import outdated
-from fields.template import NAMES, load
+from fields.template import load
 from models.training.courts.floors import grass
 from models.training.pitches.conditions import Conditions
 from models.training.pitches.render import render_frame
@@ -36,7 +36,12 @@ from worker.calibration.geometry.derivatives import moved
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.parameters import with_focal_length
 
-ON_GRASS = [name for name in NAMES if grass in GROUNDS[name]]
+SPORTS = (
+    *("american-football", "basketball", "beach-volleyball", "football", "futsal", "handball", "hockey", "ice-hockey"),
+    *("lacrosse", "netball", "padel", "rugby-union", "tennis", "volleyball"),
+)
+"""Sports of the set. A template that comes to ESC later is not among them: cases of a seed are the same for ever."""
+ON_GRASS = [name for name in SPORTS if grass in GROUNDS[name]]
 STARTS = {"wind": (0.02, 0.05), "touched": (0.16, 2.1), "turned": (0.3, 5.0)}
 """Metres and degrees between the stored pose and the true one: a windy night, the start of the ESC paper, a push."""
 SPOILED = 0.25
@@ -80,7 +85,7 @@ class Made:
 
 def _keep(number: int, rng: np.random.Generator) -> Made:
     """One stored camera, and a frame some time later."""
-    sport = NAMES[number % len(NAMES)]
+    sport = SPORTS[number % len(SPORTS)]
     said, real = _field(sport, rng)
     believed = random_camera(rng, said)
     taken = _taken(sport, real, as_built(believed, rng), number, rng)
@@ -91,7 +96,7 @@ def _keep(number: int, rng: np.random.Generator) -> Made:
 
 def _find(number: int, rng: np.random.Generator) -> Made:
     """One frame; of every second camera the lens is known."""
-    sport = NAMES[number % len(NAMES)]
+    sport = SPORTS[number % len(SPORTS)]
     said, real = _field(sport, rng)
     believed = random_camera(rng, said)
     known = known_camera(believed)
@@ -164,7 +169,7 @@ def _field(name: str, rng: np.random.Generator) -> tuple[Field, Field]:
 def _taken(sport: str, real: Field, camera: Camera, number: int, rng: np.random.Generator) -> Taken:
     """Take a frame, which something may be wrong with: another sport, a mirrored picture, fog, a tarpaulin."""
     wrong = rng.choice(["sport", "mirror", "fog", "tarpaulin"]) if rng.random() < SPOILED else ""
-    shown = str(rng.choice([name for name in NAMES if name != sport])) if wrong == "sport" else sport
+    shown = str(rng.choice([name for name in SPORTS if name != sport])) if wrong == "sport" else sport
     field = real if shown == sport else usual_field(shown)
     shot = take_shot(shown, field, camera, rng, is_usual_floor=number % 4 < 2)
     spoil: Mapping[str, Callable[[Frame], Frame]] = {

@@ -37,7 +37,7 @@ class CameraRecord:
         return CheckedCamera(id=self.id, image_size=size, intrinsics=self.intrinsics, pose=self.pose)
 
     def numbered(self, number: int) -> NumberedCamera:
-        """Return the camera for the writers; refuse one without a size, which no format does without."""
+        """Return the camera for the writers, which need its picture size: one without is refused."""
         if self.size is None:
             raise Problem(
                 "format-cannot-hold",

@@ -12,7 +12,7 @@ import logging
 import os
 import sys
 from collections.abc import Callable
-from typing import Any
+from typing import Any, assert_never
 
 import cv2
 
@@ -98,8 +98,8 @@ def _compute(task: Task, files: Files, means: ComputeResources, report: Callable
             return find.solve(site, files, options.seed or 0, means, report)
         case CheckedFile() as given:
             return check.solve(given, files, means, report)
-        case _:
-            raise AssertionError(task.kind)
+        case _ as unknown:
+            assert_never(unknown)
 
 
 def _venue_of(task: Task) -> Venue:

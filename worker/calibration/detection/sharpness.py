@@ -14,7 +14,7 @@ REACH = 14
 def edge_blur_px(frame: Frame, small: NDArray[np.uint8], where: NDArray[np.bool_]) -> float | None:
     """Return the standard deviation, in pixels of `frame`, of the blur of its sharper edges; None with too few.
 
-    small (h, w): the grey picture reduced; where (h, w): which part of it counts.
+    `small` (h, w): the grey picture, reduced by area to about 960 columns; `where` (h, w): the part of it that counts.
     """
     pixel, direction = _steep_places(small, where)
     if len(pixel) < FEWEST_EDGES:

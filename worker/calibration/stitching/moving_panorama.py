@@ -41,7 +41,7 @@ class MovingPanorama:
     def at(self, cameras: Sequence[Camera]) -> Panorama:
         """Return the panorama where the same cameras, in the same order, have moved by a degree or two."""
         motions = [
-            _filled((camera.project(self._points) - before).astype(np.float32))
+            filled((camera.project(self._points) - before).astype(np.float32))
             for before, camera in zip(self._before, cameras, strict=True)
         ]
         parts = [
@@ -82,8 +82,8 @@ def _used(part: Contribution, step: int) -> NDArray[np.bool_]:
     return np.asarray(reach, bool)[row, column]
 
 
-def _filled(motion: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return motion (h, w, 2) with means of the neighbours where it is NaN, and none farther off."""
+def filled(motion: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return motion (h, w, 2) where it is NaN with means of its neighbours, up to three places away; beyond that 0."""
     known = np.asarray(np.isfinite(motion).all(axis=-1))
     for _ in range(3):
         if known.all():

@@ -5,7 +5,7 @@ import pytest
 
 from testbed.synthetic import CROWNED, pair
 from worker.calibration.geometry.derivatives import moved
-from worker.calibration.stitching.moving_panorama import STILL_BORDER, VIEW_BORDER, MovingPanorama
+from worker.calibration.stitching.moving_panorama import STILL_BORDER, VIEW_BORDER, MovingPanorama, filled
 from worker.calibration.stitching.panorama import panorama
 from worker.calibration.stitching.views import ViewChoice, chosen_view
 
@@ -74,3 +74,11 @@ def test_cameras_that_have_turned_far_show_what_is_left_of_their_frames():
     for part in far.parts:
         at = part.source[part.weight > 0]
         assert np.all((at >= 0) & (at <= np.array(part.frame_size) - 1))
+
+
+def test_holes_in_the_motion_are_filled_from_around_them_up_to_three_places_away():
+    motion = np.ones((12, 5, 2), np.float32)
+    motion[2, 2] = motion[4:] = np.nan
+    expected = np.ones((12, 5, 2), np.float32)
+    expected[7:] = 0
+    assert filled(motion) == pytest.approx(expected)
