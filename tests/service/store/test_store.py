@@ -155,17 +155,35 @@ def test_a_bucket_that_does_not_answer_is_asked_for_as_long_as_its_caller_is_pat
     assert gives_up_in_time(monkeypatch, "http://127.0.0.1:1")
 
 
+def writes_all_it_can(stock, task):
+    """A worker that does not know yet that its attempt is over."""
+    stock.attempts.finish(task, result(task.venue, True), [])
+    stock.attempts.fail(task, JobError(type="/problems/job-crashed", title="", detail=""))
+    assert not stock.attempts.hand_back(task)
+
+
 @in_both_homes
 def test_a_job_that_was_cancelled_stays_so_whatever_its_worker_still_writes(stock):
     task = stock.attempts.begin(stock.submitted("v"))
     stock.decisions.cancel(task.job_id)
     before = stock.venues.get("v")
-    stock.attempts.finish(task, result(task.venue, True), [])
-    stock.attempts.fail(task, JobError(type="/problems/job-crashed", title="", detail=""))
-    assert not stock.attempts.hand_back(task)
+    writes_all_it_can(stock, task)
     job = stock.jobs.get(task.job_id)
     assert (job.status, job.result, job.error) == ("cancelled", None, None)
     assert stock.venues.get("v") == before
+
+
+@in_both_homes
+def test_a_job_that_was_given_to_another_worker_is_that_ones_whatever_the_first_still_writes(stock):
+    job_id = stock.submitted("v")
+    first, other = stock.attempts.begin(job_id), stock.attempts.begin(job_id)
+    before = stock.venues.get("v")
+    writes_all_it_can(stock, first)
+    job = stock.jobs.get(job_id)
+    assert (job.status, job.attempt, job.result, job.error) == ("running", 2, None, None)
+    assert stock.venues.get("v") == before
+    stock.attempts.finish(other, result(other.venue, True), [])
+    assert stock.jobs.get(job_id).status == "succeeded"
 
 
 def test_a_job_is_handed_out_with_the_lenses_that_its_poses_belong_to(stock):
