@@ -323,6 +323,15 @@ def test_a_receiver_that_takes_its_time_holds_up_no_other(stock, receiver, clock
     sender.finish()
 
 
+def test_attempts_that_go_on_count_among_those_that_one_receiver_has_at_once(stock, clock):
+    home = stock()
+    for name in ("slow", "slow", "other"):
+        ended(home, f"https://{name}.example/")
+    going_on = {"slow.example": AT_ONCE_PER_RECEIVER - 1}
+    claimed = home.outbox.claim_due(clock.now, clock.now + ATTEMPT, AT_ONCE, going_on)
+    assert sorted(delivery.receiver for delivery in claimed) == ["other.example", "slow.example"]
+
+
 def test_many_ends_are_told_to_one_receiver_without_pauses(stock, receiver, clock):
     home, hook = stock(), receiver()
     for _ in range(3 * AT_ONCE_PER_RECEIVER):
