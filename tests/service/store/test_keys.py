@@ -54,6 +54,13 @@ def test_an_expired_key_is_still_a_key(keys):
     assert keys.all()[0].expired
 
 
+def test_a_key_that_is_rotated_ends_no_later_than_it_would_have(keys):
+    end = datetime.now(UTC) + timedelta(hours=1)
+    keys.add("cron", "read", end)
+    keys.rotate("cron", timedelta(days=1))
+    assert [(key.name, key.expires_at) for key in keys.all()] == [("cron", end), ("cron-old", end)]
+
+
 @in_both_homes
 def test_a_use_that_another_process_noted_later_stays(keys):
     of = {name: hash_of(keys.add(name, "read")) for name in ("a", "b")}
