@@ -5,7 +5,9 @@ from datetime import UTC, datetime
 import pytest
 import sqlalchemy as sa
 
+from service.routes.jobs import STRAGGLING
 from service.store import tables
+from service.store.jobs.files import frame_folder, pictures_folder
 from testbed.homes import in_both_homes, in_one_home_first
 from testbed.running import SIZE, png, upload
 
@@ -183,6 +185,15 @@ def test_a_job_whose_frames_are_past_their_time_names_none(service, name):
         410,
         "/problems/frames-deleted",
     )
+
+
+def test_of_a_deleted_job_what_its_worker_writes_meanwhile_is_swept_once_it_must_have_stopped(service, name):
+    job = service.calibrated(service.venue(name))["id"]
+    assert service.http.delete(f"/jobs/{job}").status_code == 204
+    expiry, folders = service.context.expiry, {frame_folder(job), pictures_folder(job)}
+    now = expiry.now()
+    assert folders.isdisjoint(expiry.leftovers(now, 1000))
+    assert folders <= {*expiry.leftovers(now + STRAGGLING, 1000)}
 
 
 @pytest.mark.parametrize("nonsense", ["XYZ", "01kaj3q6wz5t3y8r0n4m2c7b1d", "%00", "a" * 300])
