@@ -1,0 +1,34 @@
+"""Clients that wait for a change while the database cannot be read."""
+
+import asyncio
+from itertools import cycle
+
+import pytest
+
+from service.api.change_watch import ChangeWatch
+
+AWAY = OSError("the database is away")
+
+
+@pytest.mark.parametrize(
+    ("looks", "expected"),
+    [([AWAY], None), ([AWAY, {"v": 1}, AWAY, {"v": 2}], 2)],
+    ids=["one that lasts", "two short ones"],
+)
+def test_an_outage_that_lasts_lets_go_of_who_waits_and_two_short_ones_do_not(looks, expected):
+    coming = cycle(looks)
+
+    def read(_):
+        found = next(coming)
+        if found is AWAY:
+            raise found
+        return found
+
+    async def waits():
+        watch = ChangeWatch(read, interval_s=0, patience_s=0)
+        polls = asyncio.create_task(watch.run())
+        reached = await watch.until("v", lambda state: state == 2, 10)
+        polls.cancel()
+        return reached
+
+    assert asyncio.run(waits()) == expected
