@@ -230,6 +230,16 @@ def test_a_pose_that_was_wrong_is_right_at_once():
     assert turn == pytest.approx(math.radians(3))
 
 
+def test_a_pose_that_comes_with_another_lens_is_right_with_it_at_once():
+    venue = demo()
+    camera, poses = venue.cameras[0], StoredPoses(venue)
+    longer = [[1.05 * value for value in row] for row in camera.intrinsics.matrix[:2]] + [[0, 0, 1]]
+    lens = camera.intrinsics.model_copy(update={"matrix": longer})
+    target = turned(venue.with_cameras({camera.id: {"intrinsics": lens}}), camera.id, 0.002)
+    poses.replace(target, now=100.0)
+    assert poses.at(100.0)[0].camera == target.cameras[0]
+
+
 def test_a_new_pose_on_the_way_to_another_is_moved_to_from_there():
     venue = demo()
     camera, poses = venue.cameras[0].id, StoredPoses(demo())
