@@ -190,6 +190,8 @@ def test_colmap_reads_the_models_and_esc_reads_what_colmap_writes(tmp_path):
         (tmp_path / name).write_bytes(content)
     model = pycolmap.Reconstruction(str(tmp_path))
     assert {camera.model.name for camera in model.cameras.values()} == {"OPENCV_FISHEYE", "FULL_OPENCV"}
+    for image in model.images.values():
+        image.points2D = [pycolmap.Point2D([700.0, 500.0]), pycolmap.Point2D([800.0, 600.0])]
     for kind in ("text", "binary"):
         folder = tmp_path / kind
         folder.mkdir()
