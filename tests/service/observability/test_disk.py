@@ -1,3 +1,7 @@
+import sys
+
+import pytest
+
 from service.observability.disk import Disk
 from service.settings import Settings
 
@@ -9,6 +13,11 @@ def test_the_embedded_home_is_watched(tmp_path):
 
 def test_a_database_in_a_folder_is_watched_although_the_files_are_in_a_bucket(tmp_path):
     assert Disk(Settings(data=tmp_path, blob_url="s3://bucket/esc", min_free_mb=1e12)).is_short()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="/proc is a file system without a free byte")
+def test_of_two_disks_the_fuller_one_counts(tmp_path):
+    assert Disk(Settings(data=tmp_path, blob_url="file:///proc")).free_bytes() == 0
 
 
 def test_a_bucket_and_postgresql_are_never_short():
