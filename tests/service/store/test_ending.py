@@ -205,8 +205,8 @@ def test_time_alone_breaks_a_rule_and_says_beforehand_when():
 def test_the_first_displacement_is_the_anchor_and_one_from_another_anchor_does_not_count():
     place = Place()
     for anchor in (None, 1, 7):
-        place.calibrate(True, left={"displacement": displacement(0.02, anchor=anchor)})
-    assert [night.across_m for night in place.state.nights["left"]] == [0.0, 0.02]
+        place.calibrate(True, left={"displacement": displacement(0.02, 0.03, anchor=anchor)})
+    assert [(night.across_m, night.away_m) for night in place.state.nights["left"]] == [(0.0, 0.0), (0.02, 0.03)]
     assert place.state.newest_anchors()["left"].posed is not None
     assert place.state.newest_anchors()["right"].posed is None
 
