@@ -34,6 +34,14 @@ def test_a_zip_is_written_and_read(tmp_path):
     assert [camera.id for camera in read_paths([tmp_path / "lenses.zip"]).cameras] == ["left", "right"]
 
 
+@pytest.mark.parametrize(("said", "expected"), [("", (1280, 720)), ("size = [1920, 1080]", (1920, 1080))])
+def test_the_size_of_the_pictures_is_taken_for_files_that_do_not_say_it(tmp_path, said, expected):
+    (tmp_path / "a.toml").write_text(f"[cam_01]\n{said}\nmatrix = [[900, 0, 640], [0, 900, 360], [0, 0, 1]]\n")
+    convert([tmp_path / "a.toml"], tmp_path / "a.json", image_size="1280x720", to="json")
+    (camera,) = read_paths([tmp_path / "a.json"]).cameras
+    assert camera.size == expected
+
+
 @pytest.mark.parametrize(
     ("options", "code", "words"),
     [
