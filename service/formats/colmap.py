@@ -222,7 +222,7 @@ def _unpack(file: ParsedFile, form: str, at: int) -> tuple[Any, ...]:
     """Return the values at a byte; refuse a file that ends before."""
     try:
         return struct.unpack_from(form, file.content, at)
-    except struct.error:
+    except (struct.error, OverflowError):
         raise FileRefusedError(
             file.name, f"byte {at}", "more bytes: the file is cut off or damaged", f"{len(file.content)} in all"
         ) from None

@@ -323,6 +323,8 @@ MIRRORED = [[1.0, 0, 0], [0, 1.0, 0], [0, 0, -1.0]]
         ),
         ("a.cameramodel", "{'lensmodel': __import__('os').getcwd()}", "expected valid .cameramodel, got malformed"),
         ("a.bin", b"\0" * 40, "a.bin: expected a calibration of"),
+        # COLMAP's images, two of them, the first with more points than any file has.
+        ("a.bin", b"\2" + b"\0" * 71 + b"a\0" + b"\x7f" * 8, "a.bin: expected a calibration of"),
         (
             "a.json",
             json.dumps({"calibrationType": "geo", "sensors": [{}]}),
