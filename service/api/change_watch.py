@@ -82,6 +82,8 @@ class ChangeWatch(Generic[State]):
                     future.set_result(state)
             if not self._waiting:
                 self._has_waiters.clear()
+                # Nobody looks from now on: an outage that goes on is not known to.
+                self._unread_since = None
             await asyncio.sleep(self._interval_s)
 
     def close(self) -> None:

@@ -32,3 +32,25 @@ def test_an_outage_that_lasts_lets_go_of_who_waits_and_two_short_ones_do_not(loo
         return reached
 
     assert asyncio.run(waits()) == expected
+
+
+def test_an_outage_of_which_nobody_saw_the_end_is_not_counted_for_who_waits_later():
+    looks = iter([AWAY, AWAY, AWAY, {"v": 2}])
+    patience_s = 0.2
+
+    def read(_):
+        found = next(looks)
+        if found is AWAY:
+            raise found
+        return found
+
+    async def waits():
+        watch = ChangeWatch(read, interval_s=0.05, patience_s=patience_s)
+        polls = asyncio.create_task(watch.run())
+        assert await watch.until("v", lambda state: state == 2, 0.01) is None
+        await asyncio.sleep(2 * patience_s)
+        reached = await watch.until("v", lambda state: state == 2, 10)
+        polls.cancel()
+        return reached
+
+    assert asyncio.run(waits()) == 2
