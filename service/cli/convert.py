@@ -69,7 +69,8 @@ def convert(
     found = read_calibration(sources)
     cameras = chosen_cameras(found, camera)
     if image_size is not None:
-        cameras = [replace(one, size=one.size or parse_size(image_size, "--image-size")) for one in cameras]
+        named = parse_size(image_size, "--image-size")
+        cameras = [replace(one, size=one.size or named) for one in cameras]
     try:
         if crop is not None:
             cameras = [cropped(one, _parse_crop(crop)) for one in cameras]

@@ -47,6 +47,7 @@ def test_the_size_of_the_pictures_is_taken_for_files_that_do_not_say_it(tmp_path
     [
         ({}, 2, "Say the format of"),
         ({"to": "freed"}, 2, "freed is written of a stored venue only: esc venue poses VENUE --format freed"),
+        ({"to": "json", "image_size": "large"}, 2, "expected WIDTHxHEIGHT, for instance 1920x1080"),
         ({"to": "json", "size": "1920"}, 2, "expected WIDTHxHEIGHT, for instance 1920x1080"),
         ({"to": "json", "crop": "1,2"}, 2, "expected X,Y,WIDTH,HEIGHT"),
         ({"to": "json", "crop": "3000,0,1000,1000"}, 2, "the crop leaves the 3840x2160 pixels of camera left"),
