@@ -5,10 +5,13 @@ import shlex
 from functools import cache
 from importlib import metadata
 from pathlib import Path
+from typing import get_args
 
 import pytest
 
+from fields import template
 from service import build
+from service.schemas.names import FormatName
 from service.schemas.options import Options
 from service.schemas.results import CameraResult, Result
 from service.settings import setting_names
@@ -115,6 +118,13 @@ def test_no_document_and_no_file_of_operators_speaks_of_a_variable_that_a_start_
 def test_the_index_lists_every_page():
     linked = set(re.findall(r"\]\(([a-z-]+\.md)\)", INDEX.read_text()))
     assert linked == {path.name for path in (ROOT / "docs").glob("*.md")} - {INDEX.name}
+
+
+def test_the_readme_counts_sports_and_formats_as_they_are():
+    readme = (ROOT / "README.md").read_text()
+    numbers = ("fourteen", "fifteen", "sixteen", "seventeen", "eighteen")
+    counted = {"sports": len(template.NAMES), "formats": len(get_args(FormatName))}
+    assert [f"[{numbers[count - 14]} {what}]" in readme for what, count in counted.items()] == [True, True]
 
 
 def glossary_entries():
