@@ -13,6 +13,7 @@ from worker.calibration.detection.evidence import evidence_of
 from worker.calibration.detection.exclusions import left_out
 from worker.calibration.diagnostics.overlap import overlap_of
 from worker.calibration.geometry.field import Field
+from worker.calibration.geometry.visibility import VisibleLines
 
 GRIDIRON = load("american-football")
 ONE = camera("one", (-1.0, -48.0, 14.0), (-20.0, -5.0), focal=700.0)
@@ -48,6 +49,11 @@ def test_a_listed_line_where_the_venue_has_its_own_hides_nothing():
     same = replace(PITCH, others=PITCH.template.markings({"length": 105.0, "width": 68.0, "line": 0.12}))
     paint = paint_markings(PITCH, ONE)
     assert overlap_of(same, ONE, paint).found == pytest.approx(overlap_of(PITCH, ONE, paint).found)
+
+
+def test_lines_of_the_venue_count_where_others_cross_them():
+    x, y = np.rint(VisibleLines.from_camera(PITCH.line_points(), ONE).pixel).astype(int).T
+    assert not left_out(LISTED, ONE)[y, x].any()
 
 
 def test_where_nothing_else_is_painted_all_of_a_frame_counts():

@@ -82,6 +82,11 @@ def test_how_far_a_camera_turned_in_each_frame_is_found_to_a_twentieth_of_a_pixe
         assert np.abs(sway.shift - expected).max() < 0.05
 
 
+def test_the_still_view_is_the_mean_of_all_frames_and_not_the_first():
+    first, *later = found()
+    assert first.shift == pytest.approx(-sum(sway.shift for sway in later), abs=0.05)
+
+
 @pytest.mark.long
 def test_lines_thinner_than_the_shaking_stay_as_they_are_in_one_frame():
     still = [Sway(None)] * len(frames())
