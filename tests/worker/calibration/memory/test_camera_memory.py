@@ -80,9 +80,14 @@ def test_a_camera_that_looks_elsewhere_begins_an_epoch_and_keeps_the_one_before(
     assert [epoch.jobs for epoch in memory.epochs] == [ANCHOR_JOBS, 1, 6]
 
 
-def test_another_lens_is_another_epoch():
-    zoomed = with_focal_length(CAMERA, 20.0)
-    assert not remembered(1).anchor.looks_like(zoomed, LINES)
+BENT = replace(CAMERA.intrinsics, distortion=CAMERA.intrinsics.distortion + [1e-4, 0, 0, 0, 0])
+
+
+@pytest.mark.parametrize("other", [with_focal_length(CAMERA, 20.0), CAMERA.with_lens(BENT)])
+def test_another_lens_is_another_epoch(other):
+    anchor = remembered(1).anchor
+    assert anchor.looks_like(CAMERA, LINES)
+    assert not anchor.looks_like(other, LINES)
 
 
 def test_a_marking_that_was_painted_anew_is_forgotten_and_stays_so():

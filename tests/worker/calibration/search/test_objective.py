@@ -73,6 +73,15 @@ def test_a_blurred_line_has_the_height_that_is_expected_of_it(sigma):
     assert height == pytest.approx(float(blurred_line(np.array([12.0]), sigma)[0]), rel=0.05)
 
 
+@pytest.mark.parametrize("sigma", [1.0, 10.0, 48.0])
+def test_a_blurred_line_stays_where_it_was_however_coarsely_it_is_kept(sigma):
+    picture = np.zeros((400, 704), dtype=np.float32)
+    picture[:, 336:368] = 1
+    edges = np.array([[336.0, 367.0]]), np.array([[200.0, 200.0]])
+    ((left, right),) = BlurredResponse.from_response(picture, sigma).at(*edges)
+    assert left == pytest.approx(right, rel=1e-3)
+
+
 def test_outside_the_picture_there_is_nothing():
     blurred = BlurredResponse.from_response(np.ones((100, 100), dtype=np.float32), 2.0)
     column, row = np.array([[-50.0, 20.0, np.nan, np.inf]]), np.array([[20.0, 1e9, np.nan, 3.0]])
