@@ -43,13 +43,23 @@ def centre_only():
     return fitted(PITCH, [one], Field(104.0, 67.5))
 
 
+WHOLE_COURT = camera("whole", (0.0, -11.0, 6.0), (0.0, -1.0), focal=420.0)
+
+
 def test_a_court_that_is_shorter_and_narrower_than_said_is_found():
     truth, given = Field(23.7, 10.9, 0.05, template=load("tennis")), Field(23.77, 10.97, 0.05, template=load("tennis"))
-    refined, measures = fitted(truth, [camera("whole", (0.0, -11.0, 6.0), (0.0, -1.0), focal=420.0)], given)
+    refined, measures = fitted(truth, [WHOLE_COURT], given)
     for name, real in (("length_m", 23.7), ("width_m", 10.9)):
         assert measures[name].known, name
         assert abs(measures[name].value - real) < 3 * measures[name].sigma < 0.03, name
     assert (refined.pitch.length, refined.pitch.width) == (measures["length_m"].value, measures["width_m"].value)
+
+
+def test_a_ridge_that_is_held_too_long_leaves_width_and_height_as_open_as_it_bends_them():
+    truth = Field(23.77, 10.97, 0.05, np.array([[-2.0, 0.0, 0.15], [2.0, 0.0, 0.15]]), load("tennis"))
+    _, measures = fitted(truth, [WHOLE_COURT], truth.with_ridge_length(20.0))
+    for name, real in (("width_m", 10.97), ("ridge_height_m", 0.15)):
+        assert abs(measures[name].value - real) < 3 * measures[name].sigma, name
 
 
 @pytest.mark.long
