@@ -1,5 +1,7 @@
 """Readings of poses: each convention in which a camera can be written is undone by the reading that names it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,8 +11,12 @@ from service.schemas.check import CheckedCamera
 from service.schemas.geometry import Intrinsics
 from service.schemas.geometry import Pose as PoseSchema
 from testbed.spoiled_calibrations import spoiled_ways
+from testbed.synthetic import CROWNED, pair, pair_markings
+from worker.calibration.checking.ranking import rank_readings
 from worker.calibration.checking.readings import readings
 from worker.calibration.geometry.camera import Pose
+from worker.calibration.relocalisation.line_view import LineView
+from worker.calibration.relocalisation.sought import KNOCKED_ROLL_DEG
 
 HALF = np.array([52.5, 34.0])
 ALL = list(readings())
@@ -71,3 +77,10 @@ def test_on_a_symmetric_field_what_is_half_turned_is_read_without_a_turn():
         pose = reading.pose(given_pose, HALF)
         simpler = tuple(cause for cause in reading.causes if cause != "world-axes")
         assert any(is_same_on_a_symmetric_field(one, pose.matrix, pose.position) for one in without[simpler])
+
+
+def test_a_file_whose_origin_is_a_corner_is_told_by_the_lines_in_its_frame():
+    left, paint = pair()[0], pair_markings()[0]
+    from_corner = left.with_pose(replace(left.pose, position=left.pose.position - [-52.5, 34.0, 0.0]))
+    view = LineView.of((255 * paint).astype(np.uint8), left.intrinsics, KNOCKED_ROLL_DEG)
+    assert rank_readings(CROWNED, [from_corner], [[view]], 0)[0].causes == ("corner-origin",)

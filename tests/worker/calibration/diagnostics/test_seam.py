@@ -8,7 +8,7 @@ import pytest
 
 from testbed.synthetic import CROWNED, moved, pair
 from tests.worker.calibration.sights import pair_observed
-from worker.calibration.diagnostics.seam import measure_seam
+from worker.calibration.diagnostics.seam import Seam, SeamPlace, measure_seam
 from worker.calibration.refinement.refine import evaluate_poses
 
 
@@ -41,6 +41,12 @@ def test_the_places_are_in_order_from_end_to_end_and_the_worst_is_named():
     along = [place.at[1] for place in turned.places]
     assert np.corrcoef(along, np.arange(len(along)))[0, 1] > 0.9
     assert turned.worst.error_m > np.median([place.error_m for place in turned.places])
+
+
+def test_a_place_that_is_measured_badly_is_not_the_worst():
+    measured = [(0.02, 0.01), (0.05, 0.01), (0.04, 0.012), (0.3, 0.1)]
+    places = [SeamPlace(np.zeros(2), np.array([1.0, 0.0]), error_m, sigma_m) for error_m, sigma_m in measured]
+    assert Seam(places).worst is places[1]
 
 
 def test_cameras_that_have_measured_nothing_in_common_have_no_seam():
