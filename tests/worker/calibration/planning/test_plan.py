@@ -14,6 +14,7 @@ from worker.calibration.geometry.camera import Camera, Pose
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.parameters import lens_parameters, with_lens_changed
 from worker.calibration.geometry.rotation import rotation_vectors
+from worker.calibration.planning.ground_errors import ground_error_jacobian
 from worker.calibration.planning.line_state import STATES, LineState, expect_measurements
 from worker.calibration.planning.plan import plan
 from worker.calibration.refinement.expected_errors import ErrorModel
@@ -88,6 +89,15 @@ def test_a_calibration_errs_by_what_was_expected():
         (found,) = refine(hall, [one], sight, 0.5).cameras
         off.append(found.pose.position - one.pose.position)
     assert 0.6 < np.sqrt(np.mean(np.array(off) ** 2 / np.diag(sigma)[3:6])) < 1.5
+
+
+def test_a_field_that_is_longer_or_wider_than_said_puts_a_place_off_by_its_share_of_it():
+    one, points = aimed("one", (0.0, -48.0, 12.0), (0.0, 0.0)), np.array([[10.0, 34.0, 0.0], [-20.0, -17.0, 0.0]])
+    unknowns = ErrorModel(PITCH, [one]).unknowns
+    off = ground_error_jacobian(PITCH, one, 0, points, unknowns)
+    by = {parameter.name: off[..., number] for number, parameter in unknowns.parameters_of(0)}
+    np.testing.assert_allclose(by["length_m"], points[:, :2] * [-1 / 105, 0], atol=1e-9)
+    np.testing.assert_allclose(by["width_m"], points[:, :2] * [0, -1 / 68], atol=1e-9)
 
 
 def test_the_ground_in_view_of_two_cameras_is_covered_twice_and_told_alike():

@@ -19,8 +19,8 @@ from worker.calibration.planning.warnings import REFUSED, find_warnings
 FRESH = STATES["fresh"]
 
 
-def kinds(cameras):
-    return {(warning.kind, *warning.cameras) for warning in find_warnings(plan(PITCH, cameras, FRESH))}
+def kinds(cameras, hidden=0.0):
+    return {(warning.kind, *warning.cameras) for warning in find_warnings(plan(PITCH, cameras, FRESH, hidden))}
 
 
 def test_a_raised_camera_keeps_the_ground_in_the_middle_of_its_picture_and_its_roll():
@@ -68,6 +68,12 @@ def test_a_lone_line_is_warned_of_as_the_gate_would_refuse_it():
     found = {kind for kind, *_ in kinds([lone_line()])}
     assert found & set(REFUSED)
     assert not {kind for kind, *_ in kinds(pair())} & set(REFUSED)
+
+
+def test_of_lines_that_people_hide_too_few_points_may_be_left_to_measure():
+    few = "few-lines", lone_line().id
+    assert few not in kinds([lone_line()])
+    assert few in kinds([lone_line()], hidden=0.7)
 
 
 def test_a_plan_with_two_cameras_moved_is_the_plan_of_all_at_their_new_poses():
