@@ -21,8 +21,10 @@ from tests.worker.video.filming import LEFT, PITCH, RIGHT, cameras, film, frame_
 from worker.calibration.stitching.panorama import BACKDROP, panorama
 from worker.calibration.stitching.photometry import NEUTRAL
 from worker.calibration.stitching.views import ViewChoice, chosen_view
+from worker.video.clips import ClipPicture
 from worker.video.encoding import Encoding
 from worker.video.errors import VideoError
+from worker.video.frame_timing import ClipTrack
 from worker.video.stitch import Offset, Plan, StaticGeometry, StitchScene, stitch
 
 pytestmark = pytest.mark.slow
@@ -124,6 +126,12 @@ def test_clips_that_began_apart_are_put_in_time(tmp_path):
     )
     assert given.offsets == {"left": 0.0, "right": 0.4}
     assert given.found == {}
+
+
+def test_a_moment_is_shown_by_the_picture_nearest_to_it():
+    pictures = (ClipPicture(time_s, frame_at(LEFT, time_s)) for time_s in (0.0, 0.1, 0.2))
+    track = ClipTrack("left", pictures, offset_s=1.0, interval_s=0.1)
+    assert [track.at(1.0 + time_s).time_s for time_s in (0.04, 0.06, 0.14, 0.16)] == [0.0, 0.1, 0.1, 0.2]
 
 
 def test_an_offset_that_cannot_be_found_is_not_made_up(tmp_path):
