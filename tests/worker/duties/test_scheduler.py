@@ -119,6 +119,22 @@ def test_a_full_queue_has_no_frames_fetched_in_vain(home_of_schedules, duty, mon
     assert home.venues.health("v").schedule.last_error is None
 
 
+def test_frames_that_are_being_fetched_have_their_place_in_the_queue(home_of_schedules, duty, monkeypatch):
+    home, answered = home_of_schedules, threading.Event()
+    names = [f"v{number}" for number in range(VENUES)]
+    for name in names:
+        put(home, name)
+    all_due(home)
+    monkeypatch.setattr(scheduler, "POLL_S", 0.0)
+    monkeypatch.setattr(home.snapshots, "take_of_all", lambda *one, **more: answered.wait(60) and shows(*one, **more))
+    duty.poll()
+    duty.poll()
+    answered.set()
+    duty.finish()
+    assert len(waiting(home)) == LIMIT
+    assert {home.venues.health(name).schedule.last_error for name in names} == {None}
+
+
 def test_a_venue_that_is_being_calibrated_is_put_off_and_not_forgotten(home_of_schedules, duty):
     home = home_of_schedules
     put(home, "v")
