@@ -3,6 +3,7 @@
 import http.server
 import json
 import queue
+import re
 import threading
 
 import pytest
@@ -90,6 +91,9 @@ def test_a_stream_is_read_with_its_login(way):
     with Clip.open("left", f"rtsp://{LOGIN}@{camera.host}/live") as clip:
         assert next(clip.shots()).picture.size == SIZE
     camera.close()
+    # Cameras refuse a count that they have heard before: somebody may say again what he has overheard.
+    counts = [int(count, 16) for _, proof in camera.asked for count in re.findall(r"nc=(\w+)", proof)]
+    assert counts == [*range(1, len(counts) + 1)]
 
 
 def test_an_encrypted_stream_needs_the_pin_that_its_refusal_shows(tmp_path):
