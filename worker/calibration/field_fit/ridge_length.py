@@ -20,7 +20,8 @@ from worker.calibration.refinement.uncertainty import RefinedPoses
 from worker.calibration.refinement.unknowns import Unknowns
 from worker.calibration.robust import TUKEY, robust_scale, tukey_loss, tukey_weights
 
-SPACING_M = 10.0
+LENGTHS = 10
+"""Number of lengths that are tried, from none by equal parts of the field's length."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +34,7 @@ class TriedRidge:
 
 @dataclass(frozen=True)
 class TriedRidges:
-    """Ridges of all lengths, `tried` every `SPACING_M`. `held`: the field with its own length."""
+    """Ridges of `LENGTHS` lengths that were `tried`. `held`: the field with its own length."""
 
     held: Field
     tried: Sequence[TriedRidge]
@@ -58,7 +59,7 @@ class TriedRidges:
     def sigma(self) -> float:
         """Standard deviation of the length; not less than the grid can tell."""
         variance = float(self.credence @ (self.lengths - self.best) ** 2)
-        return float(np.sqrt(variance + SPACING_M**2 / 12))
+        return float(np.sqrt(variance + (self.held.length / LENGTHS) ** 2 / 12))
 
     @property
     def alike(self) -> tuple[float, float]:
@@ -86,7 +87,7 @@ def try_ridges(base: RefinedPoses, free: Sequence[Parameter], observations: Obse
     scale = robust_scale(rows.value)
     together = _together(rows, scale)
     tried = []
-    for length in np.arange(0.0, base.pitch.length, SPACING_M).tolist():
+    for length in np.linspace(0.0, base.pitch.length, LENGTHS, endpoint=False).tolist():
         there, rows_there = _fitted(base.pitch.with_ridge_length(length), base.cameras, measured, unknowns)
         away = there.change_from(base.cameras)
         loss = float(np.sum(tukey_loss(rows_there.value, scale))) + float(away @ there.prior(unknowns) @ away)

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from testbed.synthetic import CROWNED
-from worker.calibration.field_fit.ridge_length import SPACING_M, TriedRidge, TriedRidges
+from worker.calibration.field_fit.ridge_length import LENGTHS, TriedRidge, TriedRidges
 
-OF_THE_GRID = SPACING_M / np.sqrt(12)
+OF_THE_GRID = CROWNED.length / LENGTHS / np.sqrt(12)
 
 
 def tried(costs):
