@@ -185,8 +185,8 @@ class _Checker:
     def calibrate_as(self, reading: Reading, *, resized: bool) -> None:
         """Calibrate the open cameras from where a reading of the file puts them, and settle those that are accepted.
 
-        Lines may lie farther from what the file says at its word than from a pose that is to be stored: it is asked
-        where the markings are.
+        Lines may lie farther from what the file says than from a pose that is to be stored: it is asked where the
+        markings are.
         """
         meant = {one.camera.id: self._meant(one, reading, resized) for one in self.open if one.has_pose}
         filming = [camera for camera in meant.values() if films_the_field(self.pitch, camera)]
@@ -197,8 +197,9 @@ class _Checker:
                 self.settled[id] = checked
             elif not result.view.usable and result.view.cause in OF_THE_FRAME:
                 self.unusable.add(id)
-            elif reading is TAKEN_AT_ITS_WORD and _is_inexact(result):
-                self.explained.add(id)
+            elif _is_inexact(result):
+                if reading is TAKEN_AT_ITS_WORD:
+                    self.explained.add(id)
                 if checked.moved_px <= checked.tolerance_px and _passes_through_its_lens(result):
                     self.settled[id] = checked
 
