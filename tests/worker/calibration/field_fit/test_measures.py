@@ -55,7 +55,7 @@ def test_a_court_that_is_shorter_and_narrower_than_said_is_found():
     assert (refined.pitch.length, refined.pitch.width) == (measures["length_m"].value, measures["width_m"].value)
 
 
-def test_the_ridge_of_a_short_court_is_found_with_width_and_height_as_open_as_its_length_bends_them():
+def test_the_ridge_of_a_short_court_is_found_though_it_was_given_five_times_as_long():
     truth = Field(23.77, 10.97, 0.05, np.array([[-2.0, 0.0, 0.15], [2.0, 0.0, 0.15]]), load("tennis"))
     _, measures = fitted(truth, [WHOLE_COURT], truth.with_ridge_length(20.0))
     for name, real in (("width_m", 10.97), ("ridge_height_m", 0.15), ("ridge_length_m", 4.0)):
