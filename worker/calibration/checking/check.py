@@ -158,7 +158,7 @@ def good_within_px(camera: Camera) -> float:
 class _Checker:
     """Course of a check: the cameras that are `settled`, and why the others are not (`refusals`).
 
-    `explained`: those whose frames show their lines where the file at its word leads, though not exactly enough.
+    `near`: those whose frames show their lines where the file at its word leads, though not exactly enough.
     """
 
     pitch: Field
@@ -169,7 +169,7 @@ class _Checker:
     settled: dict[str, CheckedCamera] = field(default_factory=dict)
     refusals: dict[str, str] = field(default_factory=dict)
     unusable: set[str] = field(default_factory=set)
-    explained: set[str] = field(default_factory=set)
+    near: set[str] = field(default_factory=set)
     _responses: dict[str, NDArray[np.uint8]] = field(default_factory=dict)
 
     @property
@@ -179,8 +179,8 @@ class _Checker:
 
     @property
     def lost(self) -> list[GivenCamera]:
-        """Open cameras that may look elsewhere."""
-        return [one for one in self.open if one.camera.id not in self.explained]
+        """Open cameras whose frames show no lines near where the file puts them."""
+        return [one for one in self.open if one.camera.id not in self.near]
 
     def calibrate_as(self, reading: Reading, *, resized: bool) -> None:
         """Calibrate the open cameras from where a reading of the file puts them, and settle those that are accepted.
@@ -199,7 +199,7 @@ class _Checker:
                 self.unusable.add(id)
             elif _is_inexact(result):
                 if reading is TAKEN_AT_ITS_WORD:
-                    self.explained.add(id)
+                    self.near.add(id)
                 if checked.moved_px <= checked.tolerance_px and _passes_through_its_lens(result):
                     self.settled[id] = checked
 
@@ -262,7 +262,7 @@ class _Checker:
                 self.settled[id] = self._checked(id, TAKEN_AT_ITS_WORD, self.given[id].camera, result)
 
     def search(self) -> None:
-        """Search for the open cameras: zoomed where they stand, anywhere if they may, and through another lens."""
+        """Search for the open cameras: zoomed where they stand, anywhere unless they are near, through another lens."""
         ways: dict[Search, Callable[[GivenCamera], SoughtCamera | None]] = {
             "zoomed": self._zoomed,
             "anywhere": self._anywhere,
@@ -385,7 +385,7 @@ class _Checker:
         return SoughtCamera(given.camera.id, [lens], place, roll_sigma_deg=KNOCKED_ROLL_DEG)
 
     def _anywhere(self, given: GivenCamera) -> SoughtCamera | None:
-        if given.camera.id in self.explained:
+        if given.camera.id in self.near:
             return None
         return SoughtCamera(given.camera.id, [SoughtLens.known(given.camera.intrinsics)], ANYWHERE)
 
