@@ -146,6 +146,7 @@ def check_cameras(
     progress.at_fraction("evolution", SEARCH_AT)
     checker.calibrate_turned()
     checker.search()
+    checker.settle_near()
     return [checker.result(one.camera.id) for one in given]
 
 
@@ -158,7 +159,7 @@ def good_within_px(camera: Camera) -> float:
 class _Checker:
     """Course of a check: the cameras that are `settled`, and why the others are not (`refusals`).
 
-    `near`: those whose frames show their lines where the file at its word leads, though not exactly enough.
+    `near`: those whose frames show their lines where the file at its word leads, not exactly enough to be stored.
     """
 
     pitch: Field
@@ -169,7 +170,7 @@ class _Checker:
     settled: dict[str, CheckedCamera] = field(default_factory=dict)
     refusals: dict[str, str] = field(default_factory=dict)
     unusable: set[str] = field(default_factory=set)
-    near: set[str] = field(default_factory=set)
+    near: dict[str, CheckedCamera] = field(default_factory=dict)
     _responses: dict[str, NDArray[np.uint8]] = field(default_factory=dict)
 
     @property
@@ -199,7 +200,7 @@ class _Checker:
                 self.unusable.add(id)
             elif _is_inexact(result):
                 if reading is TAKEN_AT_ITS_WORD:
-                    self.near.add(id)
+                    self.near[id] = checked
                 if checked.moved_px <= checked.tolerance_px and _passes_through_its_lens(result):
                     self.settled[id] = checked
 
@@ -279,6 +280,13 @@ class _Checker:
                 if result.accepted:
                     given = self.given[result.camera.id].camera
                     self.settled[given.id] = self._checked(given.id, TAKEN_AT_ITS_WORD, given, result, searched=way)
+
+    def settle_near(self) -> None:
+        """Settle the open cameras that are near where the file puts them: nothing explains their frames better."""
+        for one in self.open:
+            checked = self.near.get(one.camera.id)
+            if checked is not None and checked.found is not None and _passes_through_its_lens(checked.found):
+                self.settled[one.camera.id] = checked
 
     def result(self, id: str) -> CheckedCamera:
         """Return the answer for a camera."""

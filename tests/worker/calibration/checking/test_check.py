@@ -42,11 +42,11 @@ def test_a_camera_that_is_lost_is_searched_everywhere():
     assert checked.found is None
 
 
-@pytest.mark.parametrize("reason", ["residual", "zoomed", "undetermined"])
+@pytest.mark.parametrize("reason", ["residual", "zoomed"])
 def test_a_camera_that_turned_and_whose_frame_is_explained_is_searched_only_through_other_lenses(reason):
     checked, searched = checked_with(refused(reason, camera=moved(LEFT, (0.02, 0.0, 0.0))))
     assert searched == ["on its mount", "on its mount"]
-    assert checked.found is None
+    assert checked.moved_px > 10
 
 
 @pytest.mark.parametrize("reason", ["residual", "zoomed"])
@@ -57,5 +57,6 @@ def test_where_the_markings_lie_is_told_without_the_exactness_of_a_pose_that_is_
 
 
 def test_a_pose_that_the_lines_leave_open_is_no_answer():
-    checked, _ = checked_with(refused("undetermined", ground_sigma=on_ground(1.0, 9.0)))
+    checked, searched = checked_with(refused("undetermined", ground_sigma=on_ground(1.0, 9.0)))
+    assert searched == ["on its mount", "on its mount"]
     assert checked.found is None
