@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 
 from worker.calibration.checking.changes import Change, fewest_changes
-from worker.calibration.checking.check import CheckedCamera
+from worker.calibration.checking.check import CheckedCamera, good_within_px
 from worker.calibration.checking.readings import Cause
 from worker.calibration.gate.displacement import measure_displacement
 from worker.calibration.gate.quality import CameraResult, Moved
@@ -49,8 +49,8 @@ class GradedCamera:
 def grade(checked: CheckedCamera, lens_folds: str | None) -> GradedCamera:
     """Return the grade of a camera; `lens_folds`: words about a lens that has no rays for a part of the picture.
 
-    A lens that folds where no marking is does no harm there: the frame is explained through it. It is named all the
-    same beside a good grade, which speaks of the markings alone.
+    One that folds where no marking is does no harm there: the frame is explained through it. It is named all the same
+    beside a good grade, which speaks of the markings alone.
     """
     folds: list[tuple[CauseOfGrade, str]] = [] if lens_folds is None else [("folds", lens_folds)]
     found = checked.found
@@ -70,6 +70,9 @@ def grade(checked: CheckedCamera, lens_folds: str | None) -> GradedCamera:
         harmful = folds if checked.searched == "lens" else []
         written += harmful
         since += _changes(checked, found.camera, lens_is_wrong=bool(harmful))
+    elif difference.pixels > good_within_px(checked.meant):
+        # What may be chance is none through a lens that is known to be wrong.
+        written += folds
     if written or any(cause in ("other-place", "other-lens") for cause, _ in since):
         return GradedCamera(checked, "wrong", [*written, *since], difference)
     if since:
