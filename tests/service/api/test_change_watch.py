@@ -10,22 +10,26 @@ from service.api.change_watch import ChangeWatch
 AWAY = OSError("the database is away")
 
 
+def reading(looks):
+    """A database that shows one of these states at each look, or is away."""
+
+    def read(_):
+        found = next(looks)
+        if found is AWAY:
+            raise found
+        return found
+
+    return read
+
+
 @pytest.mark.parametrize(
     ("looks", "expected"),
     [([AWAY], None), ([AWAY, {"v": 1}, AWAY, {"v": 2}], 2)],
     ids=["one that lasts", "two short ones"],
 )
 def test_an_outage_that_lasts_lets_go_of_who_waits_and_two_short_ones_do_not(looks, expected):
-    coming = cycle(looks)
-
-    def read(_):
-        found = next(coming)
-        if found is AWAY:
-            raise found
-        return found
-
     async def waits():
-        watch = ChangeWatch(read, interval_s=0, patience_s=0)
+        watch = ChangeWatch(reading(cycle(looks)), interval_s=0, patience_s=0)
         polls = asyncio.create_task(watch.run())
         reached = await watch.until("v", lambda state: state == 2, 10)
         polls.cancel()
@@ -35,17 +39,11 @@ def test_an_outage_that_lasts_lets_go_of_who_waits_and_two_short_ones_do_not(loo
 
 
 def test_an_outage_of_which_nobody_saw_the_end_is_not_counted_for_who_waits_later():
-    looks = iter([AWAY, AWAY, AWAY, {"v": 2}])
     patience_s = 0.2
 
-    def read(_):
-        found = next(looks)
-        if found is AWAY:
-            raise found
-        return found
-
     async def waits():
-        watch = ChangeWatch(read, interval_s=0.05, patience_s=patience_s)
+        looks = iter([AWAY, AWAY, AWAY, {"v": 2}])
+        watch = ChangeWatch(reading(looks), interval_s=0.05, patience_s=patience_s)
         polls = asyncio.create_task(watch.run())
         assert await watch.until("v", lambda state: state == 2, 0.01) is None
         await asyncio.sleep(2 * patience_s)
