@@ -96,8 +96,7 @@ class CheckedCamera:
     def sigma_px(self) -> float | None:
         """One standard deviation (rms) of the markings in view where it was found; None where nothing tells it."""
         assert self.found is not None
-        known = self.found.ground_sigma
-        return None if known is None else float(np.sqrt(np.mean(known.pixels**2)))
+        return None if self.found.ground_sigma is None else self.found.ground_sigma.rms_px
 
     @property
     def tolerance_px(self) -> float:

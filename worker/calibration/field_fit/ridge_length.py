@@ -21,7 +21,8 @@ from worker.calibration.refinement.unknowns import Unknowns
 from worker.calibration.robust import TUKEY, robust_scale, tukey_loss, tukey_weights
 
 LENGTHS = 10
-"""Number of lengths that are tried, from none by equal parts of the field's length."""
+"""Number of lengths that are tried, from none by equal parts of the field's length: the grid on which its flat
+prior is summed. A football pitch has been tried every 10 m; no length is known more finely than the grid."""
 
 
 @dataclass(frozen=True)

@@ -100,6 +100,11 @@ class GroundSigma:
         """Metres of the worst marking in view, but for the twentieth of the points that are worst."""
         return float(np.quantile(self.metres, 0.95))
 
+    @property
+    def rms_px(self) -> float:
+        """Pixels of the markings in view, root mean square."""
+        return float(np.sqrt(np.nanmean(self.pixels**2)))
+
     def worst(self, metres: float, pixels: float) -> tuple[float, float, bool]:
         """Return metres and pixels of the worst marking, and True if they are beyond both of these limits.
 

@@ -49,7 +49,7 @@ def _expected_and_found(
     if cameras.bends.any():
         bent = cameras.bends.astype(np.float32)[:, None] * (x * x + y * y) / HALF_WIDTH_PX**2
         # Nothing is seen where a lens would bend the picture back.
-        ahead = ahead & (3 * bent > -1)
+        ahead &= 3 * bent > -1
         x, y = x * (1 + bent), y * (1 + bent)
     height, width = view.distance.shape
     # A plain number leaves the coordinates in single precision.

@@ -132,4 +132,4 @@ def with_sigmas(found: RefinedPose) -> Camera:
 
 def shift_sigma_px(found: RefinedPose) -> float | None:
     """Return the rms standard deviation (px) of the markings in view by pose, lens and field; None without any."""
-    return None if found.ground_sigma is None else float(np.sqrt(np.nanmean(found.ground_sigma.pixels**2)))
+    return None if found.ground_sigma is None else found.ground_sigma.rms_px

@@ -14,10 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from worker.calibration.geometry.camera import Array, Plane
-from worker.calibration.geometry.lens import Lens
+from worker.calibration.geometry.lens import NEAREST_M, Lens
 from worker.calibration.geometry.panorama import Panorama
 
-NEAREST_M = 0.3
 Places = tuple[Plane, Plane]
 Points = tuple[Plane, Plane, Plane]
 """Coordinates in the camera's frame, each (...)."""
@@ -97,9 +96,9 @@ class PlaneSurface(ViewSurface):
 
     def pulls(self, points: Array, across: Array, focal_px: Array) -> Array:
         """Return the derivatives of the projection; those of points behind the camera mean nothing."""
-        (x, y), _ = self.project((points[..., 0], points[..., 1], points[..., 2]), focal_px)
-        along = (np.stack([x, y], axis=-1) * across).sum(axis=-1, keepdims=True)
         depth = np.where(points[..., 2:] > NEAREST_M, points[..., 2:], 1.0)
+        places = focal_px[..., None] * points[..., :2] / depth
+        along = (places * across).sum(axis=-1, keepdims=True)
         return np.concatenate([focal_px[..., None] * across, -along], axis=-1) / depth
 
     def normals(self, starts: Array, ends: Array, focal_px: Array) -> Array:
