@@ -17,6 +17,8 @@ from testbed import warm
 from testbed.parameters import try_first
 from testbed.running import wait_for
 
+pytestmark = pytest.mark.slow
+
 DOCKERFILE = Path(__file__).parents[2] / "docker" / "Dockerfile"
 
 

@@ -14,6 +14,8 @@ from service.store.jobs.task import Task
 from worker import job_process as children
 from worker.protocol import JobRequest
 
+pytestmark = pytest.mark.slow
+
 VENUE = VenueIn.model_validate(VENUE_EXAMPLE).to_venue()
 TASK = Task(
     job_id="job",

@@ -13,6 +13,8 @@ from service.schemas.venue import VenueIn
 from service.settings import Settings
 from testbed.running import png, venue
 
+pytestmark = pytest.mark.slow
+
 # Notes that it was asked, takes its time, and gives each camera the frame that it was given, or none.
 FETCH = """
 import json, pathlib, sys, time

@@ -18,6 +18,8 @@ from service.settings import Settings
 from testbed.running import venue, wait_for
 from tests.service.formats.cameras import shot
 
+pytestmark = pytest.mark.slow
+
 SLOW = [sys.executable, "-c", "import sys, time; time.sleep(0.5); sys.stdout.write(sys.stdin.read())"]
 HANGING = [sys.executable, "-c", "import time; time.sleep(600)"]
 TELLING = [sys.executable, "-c", "import json, os; print(json.dumps(dict(os.environ)))"]

@@ -14,6 +14,8 @@ from service.schemas.view import ViewChoice
 from service.settings import Settings
 from testbed.running import venue
 
+pytestmark = pytest.mark.slow
+
 # Says that it has begun, waits, and answers with what it was asked.
 SLOW = """
 import pathlib, sys, time

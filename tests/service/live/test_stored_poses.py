@@ -29,6 +29,8 @@ from service.schemas.geometry import Pose
 from service.schemas.venue import VenueIn
 from tests.service.live.receiving import freed_packet, listening, opentrackio_sample, port_of
 
+pytestmark = pytest.mark.slow
+
 DEMO = Path("demo/venue.json")
 SCHEMA = json.loads(Path("tests/service/formats/opentrackio-1.0.1.schema.json").read_text())
 FASTEST = Fraction(200)

@@ -9,6 +9,8 @@ from service.schemas.names import FormatName
 from testbed.program import NEARER
 from testbed.running import SIZE
 
+pytestmark = pytest.mark.slow
+
 
 def poses(service, path, form, **more):
     return service.http.get(f"{path}/poses", params={"format": form, **more})

@@ -16,6 +16,8 @@ from testbed.stock import result
 from tests.service.local_service import LocalService
 from worker.duties.alarms import AlarmTimer
 
+pytestmark = pytest.mark.slow
+
 SUNKEN = [[-18.5, 0.0, -0.001], [18.5, 0.0, -0.001]]
 WATCHED = {"alarms": {"not_calibrated_for_h": 1}}
 # What is known of a venue beside its document: one of these is spoilt at each venue.

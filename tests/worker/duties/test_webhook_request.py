@@ -15,6 +15,8 @@ from tests.worker.receiver import TELLTALE, Dripping, Endless, Receiver, Silent,
 from worker.duties import outbound_guard, webhook_request
 from worker.duties.webhook_request import SendError
 
+pytestmark = pytest.mark.slow
+
 
 def sent(url, **settings):
     """The response to a request that is sent there."""

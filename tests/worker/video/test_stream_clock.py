@@ -10,6 +10,8 @@ from tests.worker.video.numbered_pictures import number_shown, picture_of
 from worker.video.clips import Clip
 from worker.video.stream_clock import Lateness
 
+pytestmark = pytest.mark.slow
+
 RATE = 25
 # The first report comes within some three seconds.
 COUNT = 150

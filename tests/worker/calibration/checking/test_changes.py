@@ -2,13 +2,15 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from testbed.synthetic import PITCH, camera
 from worker.calibration.checking.changes import columns_of, fewest_changes, shift_px
 from worker.calibration.geometry.derivatives import moved
 from worker.calibration.geometry.parameters import with_lens_changed
+
+pytestmark = pytest.mark.slow
 
 TOLERANCE_PX = 4.0
 WIDE = camera("wide", (-6.0, -46.0, 11.0), (-14.0, 0.0), focal=1900.0, size=(3840, 2160))
@@ -23,6 +25,7 @@ def after(one, changes, times=1.0):
     return with_lens_changed(moved(one, by[:6]), by[6:])
 
 
+@settings(max_examples=14)
 @given(
     changes=st.sampled_from([some for number in range(len(BY)) for some in combinations(BY, number)]),
     times=st.floats(0.6, 1.5),
