@@ -9,13 +9,13 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
-import cv2
 import numpy as np
 
 from worker.calibration.detection.contrast import Channels
 from worker.calibration.detection.exclusions import of_use
 from worker.calibration.detection.frame_fusion import Sway, median, sways
 from worker.calibration.detection.paint import draw_colours
+from worker.calibration.detection.sampling import reduce_by_area
 from worker.calibration.detection.segmentation import Region, overview, reachable_regions, whole_frame
 from worker.calibration.detection.view_condition import UsualView, ViewCondition, look_at
 from worker.calibration.diagnostics.registration import Response
@@ -85,9 +85,7 @@ class FrameObserver:
         cameras = [camera.resized(min(width, camera.intrinsics.size[0])) for camera in self.cameras]
         frames = {}
         for camera in cameras:
-            first = self.frames[camera.id][0]
-            small = cv2.resize(first, camera.intrinsics.size, interpolation=cv2.INTER_AREA)
-            frames[camera.id] = [np.asarray(small, dtype=np.uint8)]
+            frames[camera.id] = [reduce_by_area(self.frames[camera.id][0], camera.intrinsics.size)]
         return FrameObserver.of(self.pitch, cameras, frames, self.segment)
 
     def in_colours(self, colours: Array, choices: Sequence[Sequence[int]]) -> "list[FrameObserver]":

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from worker.calibration.detection.line_presence import LinesInSight, look_for_lines
+from worker.calibration.detection.sampling import reduce_by_area
 from worker.calibration.detection.sharpness import edge_blur_px
 from worker.calibration.geometry.camera import Array, Camera, Frame
 from worker.calibration.geometry.field import Field
@@ -103,7 +104,7 @@ def look_at(frame: Frame, pitch: Field, camera: Camera, usual: UsualView | None 
     # Columns of the reduced picture on which all but the sharpness is judged.
     scale = 960 / camera.intrinsics.size[0]
     reduced = camera.with_lens(camera.intrinsics.scaled(scale))
-    small = np.asarray(cv2.resize(frame, reduced.intrinsics.size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+    small = reduce_by_area(frame, reduced.intrinsics.size)
     grey = np.asarray(cv2.cvtColor(small, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
     lines = _expected_lines(pitch, reduced)
     ground = _Ground.of(pitch, reduced)

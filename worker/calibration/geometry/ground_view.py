@@ -28,8 +28,11 @@ def sampled(image: NDArray[Any], pixels: NDArray[np.floating[Any]], valid: Mask)
     level = level_of_detail(pixels)
     values = np.zeros((*valid.shape, *image.shape[2:]), image.dtype)
     x[~valid] = y[~valid] = 0
+    pyramid = [image]
     for number in np.unique(level[valid]):
-        small = _shrink(image, 1 << int(number))
+        while len(pyramid) <= number:
+            pyramid.append(_halved(pyramid[-1]))
+        small = pyramid[number]
         scale = small.shape[1] / image.shape[1], small.shape[0] / image.shape[0]
         chosen = valid & (level == number)
         # Far and near lie in bands of the picture.
@@ -81,7 +84,5 @@ def footprint(x: NDArray[np.float32], y: NDArray[np.float32]) -> NDArray[np.floa
     return np.nan_to_num(np.abs(x_right * y_down - y_right * x_down), nan=0.0, posinf=0.0)
 
 
-def _shrink(image: NDArray[Any], factor: int) -> NDArray[Any]:
-    if factor == 1:
-        return image
-    return cv2.resize(image, (image.shape[1] // factor, image.shape[0] // factor), interpolation=cv2.INTER_AREA)
+def _halved(image: NDArray[Any]) -> NDArray[Any]:
+    return cv2.resize(image, (image.shape[1] // 2, image.shape[0] // 2), interpolation=cv2.INTER_AREA)

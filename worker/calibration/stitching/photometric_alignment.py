@@ -31,7 +31,7 @@ def evened_out(pitch: Field, cameras: Sequence[Camera], frames: Mapping[str, Fra
     """
     if len(cameras) < 2:
         return {}
-    view = chosen_view(pitch, cameras, ViewChoice(width=480))
+    view = chosen_view(pitch, cameras, ViewChoice(width=240))
     width, height = view.size
     points = view.behind(pitch, np.stack(np.meshgrid(np.arange(width), np.arange(height)), axis=-1).astype(float))
     seen = [_seen(camera, frames[camera.id], points) for camera in cameras]
@@ -70,17 +70,14 @@ def _seen(camera: Camera, frame: Frame, points: Array) -> _Seen:
     values = sampled(frame, pixels, within).astype(np.float32)
     exposed = within & (values.min(axis=-1) > EXPOSED[0]) & (values.max(axis=-1) < EXPOSED[1])
     # Neither noise nor the edges of what stands off the ground.
-    smoothed_px = 2.0
+    smoothed_px = 1.0
     share, total = (
         cv2.GaussianBlur(part, (0, 0), smoothed_px)
         for part in (exposed.astype(np.float32), np.where(exposed[..., None], np.log(np.maximum(values, 1)), 0))
     )
     logs: NDArray[np.float32] = (np.asarray(total) / np.maximum(np.asarray(share), 1e-6)[..., None]).astype(np.float32)
     radius = squared_radius(np.nan_to_num(pixels).astype(np.float32), size)
-    every = slice(None, None, round(smoothed_px))
-    valid = exposed & (np.asarray(share) > 0.5)
-    sees = quality(size, pixels)
-    return _Seen(logs[every, every], valid[every, every], radius[every, every], sees[every, every])
+    return _Seen(logs, exposed & (np.asarray(share) > 0.5), radius, quality(size, pixels))
 
 
 @dataclass(frozen=True)
