@@ -16,17 +16,6 @@ from service.formats.table import FILE_FORMATS
 from service.schemas.names import FormatName
 from service.schemas.problems import Problem
 
-# Names and suffixes of files that belong to one format.
-FILE_NAMES: dict[str, FormatName] = {
-    "transforms.json": "nerf",
-    "calibration.json": "metropolis",
-    "camera_array.toml": "caliscope",
-    "camchain.yaml": "kalibr",
-    "camera_info.yaml": "ros",
-    "Calib.toml": "pose2sim",
-}
-SUFFIXES: dict[str, FormatName] = {".cameramodel": "mrcal", ".yml": "opencv"}
-
 
 def convert(
     sources: Annotated[
@@ -61,7 +50,7 @@ def convert(
 
     What the format cannot hold is said; where points would be off, nothing is written.
     """
-    form = to or FILE_NAMES.get(output.name) or SUFFIXES.get(output.suffix)
+    form = to or _format_of(output)
     if form is None:
         fail(f"Say the format of {output}: --to with one of {', '.join(FILE_FORMATS)}", USAGE)
     if form not in FILE_FORMATS:
@@ -124,6 +113,13 @@ def parse_size(text: str, option: str) -> tuple[int, int]:
     if match is None:
         fail(f"{option} {text}: expected WIDTHxHEIGHT, for instance 1920x1080", USAGE)
     return int(match[1]), int(match[2])
+
+
+def _format_of(output: Path) -> FormatName | None:
+    """Return the format whose files alone have this name, or else this suffix; a zip may be of any format."""
+    named = [name for name, form in FILE_FORMATS.items() if form.file_name == output.name]
+    alike = [name for name, form in FILE_FORMATS.items() if f".{form.suffix}" == output.suffix != ".zip"]
+    return next((names[0] for names in (named, alike) if len(names) == 1), None)
 
 
 def _parse_crop(text: str) -> Crop:

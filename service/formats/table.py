@@ -58,12 +58,16 @@ class Reader:
 
 @dataclass(frozen=True)
 class Format(ABC):
-    """A file format: its media type, the suffix of its files, the function that writes one, and if it is read, how."""
+    """A file format: its media type, the suffix of its files, the function that writes one, and if it is read, how.
+
+    `file_name`: the one by which other tools look for a file of it.
+    """
 
     media_type: str
     suffix: str
     write: Callable[..., bytes]
     reader: Reader | None = None
+    file_name: str | None = None
 
     @abstractmethod
     def document(self, shots: Sequence[NumberedCamera]) -> ExportedFile:
@@ -108,13 +112,25 @@ FILE_FORMATS: Mapping[FormatName, Format] = {
     ),
     "colmap": AllCamerasFormat(ZIP, "zip", colmap.write, Reader(colmap.recognises, colmap.read)),
     "soccernet": FilePerCameraFormat(JSON, "json", soccernet.write, Reader.of(soccernet.recognises, soccernet.read)),
-    "pose2sim": AllCamerasFormat(TOML, "toml", pose2sim.write, Reader.of(pose2sim.recognises, pose2sim.read)),
-    "metropolis": AllCamerasFormat(JSON, "json", metropolis.write, Reader.of(metropolis.recognises, metropolis.read)),
-    "caliscope": AllCamerasFormat(TOML, "toml", caliscope.write, Reader.of(caliscope.recognises, caliscope.read)),
-    "kalibr": AllCamerasFormat(YAML, "yaml", kalibr.write, Reader.of(kalibr.recognises, kalibr.read)),
-    "ros": FilePerCameraFormat(YAML, "yaml", ros.write, Reader.of(ros.recognises, ros.read)),
+    "pose2sim": AllCamerasFormat(
+        TOML, "toml", pose2sim.write, Reader.of(pose2sim.recognises, pose2sim.read), file_name="Calib.toml"
+    ),
+    "metropolis": AllCamerasFormat(
+        JSON, "json", metropolis.write, Reader.of(metropolis.recognises, metropolis.read), file_name="calibration.json"
+    ),
+    "caliscope": AllCamerasFormat(
+        TOML, "toml", caliscope.write, Reader.of(caliscope.recognises, caliscope.read), file_name="camera_array.toml"
+    ),
+    "kalibr": AllCamerasFormat(
+        YAML, "yaml", kalibr.write, Reader.of(kalibr.recognises, kalibr.read), file_name="camchain.yaml"
+    ),
+    "ros": FilePerCameraFormat(
+        YAML, "yaml", ros.write, Reader.of(ros.recognises, ros.read), file_name="camera_info.yaml"
+    ),
     "mrcal": FilePerCameraFormat("text/plain", "cameramodel", mrcal.write, Reader.of(mrcal.recognises, mrcal.read)),
-    "nerf": AllCamerasFormat(JSON, "json", nerf.write, Reader.of(nerf.recognises, nerf.read)),
+    "nerf": AllCamerasFormat(
+        JSON, "json", nerf.write, Reader.of(nerf.recognises, nerf.read), file_name="transforms.json"
+    ),
 }
 
 

@@ -63,8 +63,9 @@ def hash_of(key: str) -> str:
 
 
 def old_name(name: str) -> str:
-    """Return the name of a key after its rotation, which is as long as before at most."""
-    return f"{name[: LONGEST_NAME - len(OLD)]}{OLD}"
+    """Return the name of a key after its rotation, another one that is no longer than names may be."""
+    old = f"{name[: LONGEST_NAME - len(OLD)]}{OLD}"
+    return old if old != name else f"{name[: LONGEST_NAME - 2 * len(OLD)]}{OLD}{OLD}"
 
 
 class KeyRepository(Repository):

@@ -3,7 +3,7 @@ from datetime import UTC, datetime, timedelta
 
 import pytest
 
-from service.store.keys import KeyExists, KeyRepository, hash_of
+from service.store.keys import LONGEST_NAME, KeyExists, KeyRepository, hash_of, old_name
 from testbed.homes import in_both_homes
 
 NOON = datetime(2026, 11, 21, 12, tzinfo=UTC)
@@ -59,6 +59,16 @@ def test_a_key_that_is_rotated_ends_no_later_than_it_would_have(keys):
     keys.add("cron", "read", end)
     keys.rotate("cron", timedelta(days=1))
     assert [(key.name, key.expires_at) for key in keys.all()] == [("cron", end), ("cron-old", end)]
+
+
+@pytest.mark.parametrize("name", ["cron", "c" * 62, "c" * 64, "c" * 58 + "-old", "c" * 60 + "-old"])
+def test_the_old_key_works_on_under_another_name_whatever_the_name(keys, name):
+    key = keys.add(name, "read")
+    for _ in range(2):
+        new = keys.rotate(name, timedelta(days=1))
+        assert {keys.find(hash_of(key)).name, keys.find(hash_of(new)).name} == {name, old_name(name)}
+        assert len(old_name(name)) <= LONGEST_NAME
+        key = new
 
 
 @in_both_homes
