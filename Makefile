@@ -26,20 +26,20 @@ $(VENV)/.installed: $(VENV)/.runtime
 	touch $@
 
 # Compiled files are kept even where the machine says not to: each of hundreds of processes would compile them anew.
-PYTEST := PYTHONDONTWRITEBYTECODE= $(BIN)/pytest --numprocesses=auto --dist=worksteal
+PYTEST := PYTHONDONTWRITEBYTECODE= $(BIN)/pytest --dist=worksteal
 
 # Every behaviour once; its accuracy and other parameters are left to `make test-long`. TESTS: some folders or files, default all.
 test: setup
-	$(PYTEST) -m "not long" $(TESTS)
+	$(PYTEST) --numprocesses=auto -m "not long" $(TESTS)
 
 # For the loop of a day. Not in it: the whole service, its pages, older releases, servers, whole calibrations, the network.
 test-fast: setup
-	PYTHONDONTWRITEBYTECODE= $(BIN)/pytest --numprocesses=logical --dist=worksteal -m "not (long or slow or servers)" \
+	$(PYTEST) --numprocesses=logical -m "not (long or slow or servers)" \
 		tests/fields tests/service tests/worker tests/openapi tests/test_architecture.py
 
 # What CI runs after `make test`: proofs of accuracy, second parameters, a year of a venue; CONTRIBUTING.md says which.
 test-long: setup generators charts
-	$(PYTEST) -m long $(TESTS)
+	$(PYTEST) --numprocesses=logical -m long $(TESTS)
 
 # Generators of clients, which `make test-long` tries the OpenAPI document with. They want an older typer than ESC.
 generators: $(VENV)/.generators
@@ -60,7 +60,7 @@ $(VENV)/.charts: tests/charts.lock
 # Lines and branches that `make test` reaches, by rooms. By files, with the lines that nothing reaches: .venv/bin/coverage report
 coverage: setup
 	$(BIN)/coverage erase
-	PYTHONDONTWRITEBYTECODE= $(BIN)/coverage run -m pytest --numprocesses=auto --dist=worksteal -m "not long" $(TESTS)
+	PYTHONDONTWRITEBYTECODE= $(BIN)/coverage run -m pytest --numprocesses=logical --dist=worksteal -m "not long" $(TESTS)
 	$(BIN)/coverage combine --quiet
 	$(BIN)/python -m tests.coverage_by_room
 

@@ -140,12 +140,12 @@ def dealt(items, processes):
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers(config):
-    """Of `auto` three times as many as there are cores: tests of the whole service wait longer than they compute.
+    """Of `auto` four more than there are cores: tests of the whole service wait longer than they compute.
 
     Each further process imports all tests, services and a browser, and paints all pictures, for itself.
     """
     cores = len(os.sched_getaffinity(0))
-    return 3 * cores if config.option.numprocesses == "auto" else cores
+    return cores + 4 if config.option.numprocesses == "auto" else cores
 
 
 @pytest.fixture(scope="session")
