@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from worker.calibration.diagnostics.overlap import Overlap
-from worker.calibration.gate.quality import GATE, MUCH_UNEXPECTED
+from worker.calibration.gate.quality import GATE, MUCH_UNEXPECTED, Moved
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.joint_verdict import judge_together
 from worker.calibration.near_path import NearAttempt, NearSolution, refine_by_lines
@@ -127,9 +127,21 @@ def _solve_near_in(painted: FrameObserver, problem: Problem, progress: ProgressR
 
 def _is_likelier(in_paint: Solution, in_all: Solution) -> bool:
     """True if the solution in one paint is likelier in all colours, too; less is seen of the field's lines in one."""
+    # Of one explanation that counts what is seen of more: all colours, unless it passes by one paint alone.
+    if _are_one_explanation(in_paint, in_all):
+        return not in_all.judged.accepts_all_of(in_paint.judged)
     # What passes neither way is looked for elsewhere, by all that is seen.
     passes = any(one.accepted for one in [*in_all.judged.cameras, *in_paint.judged.cameras])
     return passes and _log_odds(in_all.problem, in_paint.judged) > _log_odds(in_all.problem, in_all.judged)
+
+
+def _are_one_explanation(one: Solution, other: Solution) -> bool:
+    """True if two solutions put the markings apart by no more than lines may lie beside a pose that fits them."""
+    both = zip(one.judged.cameras, other.judged.cameras, strict=True)
+    return all(
+        Moved.between(one.problem.pitch, its.camera, there.camera).pixels <= GATE.most_residual_px(its.camera)
+        for its, there in both
+    )
 
 
 def _solve_near(problem: Problem, near: NearSolution | None, progress: ProgressReporter) -> Solution | None:

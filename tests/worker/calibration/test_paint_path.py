@@ -105,6 +105,24 @@ def test_without_their_colour_the_pose_is_drawn_to_lines_of_the_others(monkeypat
     assert off_px(result) > 1.5
 
 
+def test_a_pose_that_all_colours_are_sure_of_is_not_given_up_for_the_same_one_in_a_paint_that_shows_less(monkeypatch):
+    whole = paint_frame(VOLLEYBALL, CAMERA)
+    part = whole.copy()
+    part[:, : CAMERA.intrinsics.size[0] * 3 // 5] = GRASS
+
+    def worse_paint(problem, observer, locate, progress):
+        return observer if locate is solve.at_stored_poses else replace(observer, frames={"hall": [part]})
+
+    monkeypatch.setattr(solve, "_are_mostly_others", lambda _: True)
+    monkeypatch.setattr(solve, "show_paint_of_field", worse_paint)
+    # By how far cameras moved, one of two poses that are the same is always a little likelier.
+    odds = iter([1.0, 0.0])
+    monkeypatch.setattr(solve, "_log_odds", lambda *_: next(odds, 0.0))
+    options = Options(search="wide", recover="never")
+    result = calibrate(VOLLEYBALL, [STORED], {"hall": [whole]}, Segmenter(MODEL_PATH, 1), options).cameras[0]
+    assert result.accepted, result.rejected_because
+
+
 SOUGHT = SoughtCamera("hall", [SoughtLens.known(CAMERA.intrinsics)])
 ON_ITS_STAND = replace(SOUGHT, place=Place(position=CAMERA.pose.position))
 
