@@ -127,7 +127,7 @@ def _solve_near_in(painted: FrameObserver, problem: Problem, progress: ProgressR
 
 def _is_likelier(in_paint: Solution, in_all: Solution) -> bool:
     """True if the solution in one paint is likelier in all colours, too; less is seen of the field's lines in one."""
-    # Of one explanation that counts what is seen of more: all colours, unless it passes by one paint alone.
+    # At the same poses all colours show more than one paint does, which is taken only where no other way passes.
     if _are_one_explanation(in_paint, in_all):
         return not in_all.judged.accepts_all_of(in_paint.judged)
     # What passes neither way is looked for elsewhere, by all that is seen.

@@ -79,7 +79,7 @@ class FieldMeasure(FieldParameter):
         return list(cameras), self.write(pitch, self.read(pitch) + by)
 
     def _shift_of(self, pitch: Field) -> Array:
-        # Points move straight with each measure, but for those that a ridge begins to carry: a smaller step is enough.
+        # Points move linearly with a measure, but where two planes of the roof meet.
         field_step_m = 1e-4
         ahead = self.write(pitch, self.read(pitch) + field_step_m).measured_points.position
         return np.asarray((ahead - pitch.measured_points.position) / field_step_m, dtype=float)
