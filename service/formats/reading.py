@@ -9,15 +9,15 @@ from pathlib import Path
 from service.formats.nodes import FileRefusedError
 from service.formats.parsing import MOST_BYTES, MOST_BYTES_OF_COLMAP, ParsedFile, parse_file
 from service.formats.records import CameraRecord, with_distinct_ids
-from service.formats.table import FILE_FORMATS
+from service.formats.table import FILE_FORMATS, ZIP
 from service.schemas.check import CheckedCamera
 from service.schemas.names import FormatName, id_like
 from service.schemas.problems import Problem
 
 ZIP_START = b"PK\x03\x04"
 MOST_FILES = 1000
-# Suffixes of the files of the formats; of a folder, others are pictures and the like.
-SUFFIXES = {".json", ".yml", ".yaml", ".xml", ".toml", ".txt", ".bin", ".cameramodel"}
+# Suffixes of the files of the formats, with OpenCV's other one and COLMAP's; others in a folder are pictures.
+SUFFIXES = {f".{form.suffix}" for form in FILE_FORMATS.values() if form.media_type != ZIP} | {".xml", ".txt", ".bin"}
 
 
 @dataclass(frozen=True)

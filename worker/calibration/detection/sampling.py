@@ -5,6 +5,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from worker.calibration.geometry.camera import Array, Plane
+from worker.calibration.geometry.ground_view import halved
 
 MOST_ROWS = 32766
 """Most rows of a map for cv2.remap, and most columns."""
@@ -62,8 +63,6 @@ def reduce_by_area(picture: NDArray[np.uint8], size: tuple[int, int]) -> NDArray
     It is halved first where a picture of half the size is still twice too large: OpenCV halves a 4K frame three times
     as fast as it reduces it otherwise.
     """
-    height, width = picture.shape[:2]
-    while width >= 4 * size[0] and height >= 4 * size[1]:
-        width, height = width // 2, height // 2
-        picture = np.asarray(cv2.resize(picture, (width, height), interpolation=cv2.INTER_AREA), np.uint8)
+    while picture.shape[1] >= 4 * size[0] and picture.shape[0] >= 4 * size[1]:
+        picture = halved(picture)
     return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), np.uint8)

@@ -31,7 +31,7 @@ def sampled(image: NDArray[Any], pixels: NDArray[np.floating[Any]], valid: Mask)
     pyramid = [image]
     for number in np.unique(level[valid]):
         while len(pyramid) <= number:
-            pyramid.append(_halved(pyramid[-1]))
+            pyramid.append(halved(pyramid[-1]))
         small = pyramid[number]
         scale = small.shape[1] / image.shape[1], small.shape[0] / image.shape[0]
         chosen = valid & (level == number)
@@ -41,6 +41,11 @@ def sampled(image: NDArray[Any], pixels: NDArray[np.floating[Any]], valid: Mask)
         found = cv2.remap(small, *place, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
         values[around][chosen[around]] = found[chosen[around]]
     return values
+
+
+def halved(image: NDArray[Any]) -> NDArray[Any]:
+    """Return an image (H, W[, C]) averaged over squares of two pixels a side."""
+    return cv2.resize(image, (image.shape[1] // 2, image.shape[0] // 2), interpolation=cv2.INTER_AREA)
 
 
 def level_of_detail(pixels: NDArray[np.floating[Any]]) -> NDArray[np.uint8]:
@@ -82,7 +87,3 @@ def footprint(x: NDArray[np.float32], y: NDArray[np.float32]) -> NDArray[np.floa
     """Return the area (H, W) in source pixels of each pixel, from source positions x, y (H, W); 0 where NaN."""
     (x_down, x_right), (y_down, y_right) = np.gradient(x), np.gradient(y)
     return np.nan_to_num(np.abs(x_right * y_down - y_right * x_down), nan=0.0, posinf=0.0)
-
-
-def _halved(image: NDArray[Any]) -> NDArray[Any]:
-    return cv2.resize(image, (image.shape[1] // 2, image.shape[0] // 2), interpolation=cv2.INTER_AREA)

@@ -26,6 +26,7 @@ from worker.calibration.detection.line_profile import blurred_line
 from worker.calibration.detection.sampling import bilinear
 from worker.calibration.geometry.camera import Array, Camera
 from worker.calibration.geometry.field import Field
+from worker.calibration.geometry.ground_view import halved
 from worker.calibration.geometry.rotation import rotation_matrices
 
 PIXELS_PER_METRE = 10.0
@@ -126,16 +127,11 @@ def _above(picture: Any, threshold: float) -> Picture:
 def _pyramid(picture: Picture, count: int) -> Iterator[Grey]:
     """Yield a picture (H, W) averaged over squares of 2, 4, 8 ... pixels a side."""
     # Once in bytes, which is fast; averages of broader squares would be rounded to nothing.
-    coarse = _halved(picture).astype(np.float32)
+    coarse = halved(picture).astype(np.float32)
     yield coarse
     for _ in range(count - 1):
-        coarse = _halved(coarse)
+        coarse = halved(coarse)
         yield coarse
-
-
-def _halved(picture: Any) -> Any:
-    size = (picture.shape[1] // 2, picture.shape[0] // 2)
-    return cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
 
 
 def _half_heights(line_width: float, blurs: Blurs) -> list[float]:

@@ -1,5 +1,3 @@
-from itertools import combinations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -25,11 +23,12 @@ def after(one, changes, times=1.0):
     return with_lens_changed(moved(one, by[:6]), by[6:])
 
 
-@settings(max_examples=14)
-@given(
-    changes=st.sampled_from([some for number in range(len(BY)) for some in combinations(BY, number)]),
-    times=st.floats(0.6, 1.5),
+@pytest.mark.parametrize(
+    "changes",
+    [(), ("turned",), ("zoomed",), ("moved",), ("turned", "zoomed"), ("turned", "moved"), ("zoomed", "moved")],
 )
+@settings(max_examples=4)
+@given(times=st.floats(0.6, 1.5))
 def test_no_more_changes_are_named_than_happened(changes, times):
     found = fewest_changes(PITCH, WIDE, after(WIDE, changes, times), TOLERANCE_PX)
     assert found.changes == changes
