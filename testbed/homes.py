@@ -351,7 +351,8 @@ def s3_server() -> Iterator[Bucket]:
         address = next(line.split()[-1] for line in server.stderr if "Running on" in line)
         # It says a line per request, which nobody reads.
         threading.Thread(target=server.stderr.read, daemon=True).start()
-        httpx.put(f"{address}/{BUCKET}").raise_for_status()
+        # It imports its S3 when first asked, beside all processes of a run that begins.
+        httpx.put(f"{address}/{BUCKET}", timeout=60).raise_for_status()
         with pytest.MonkeyPatch.context() as patch:
             for name, value in {
                 "AWS_ENDPOINT_URL": address,

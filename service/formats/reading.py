@@ -16,7 +16,7 @@ from service.schemas.problems import Problem
 
 ZIP_START = b"PK\x03\x04"
 MOST_FILES = 1000
-# Suffixes of the files of the formats, with OpenCV's other one and COLMAP's; others in a folder are pictures.
+# Suffixes of the files of the formats, OpenCV's other one and those in COLMAP's zip; a folder has pictures as well.
 SUFFIXES = {f".{form.suffix}" for form in FILE_FORMATS.values() if form.media_type != ZIP} | {".xml", ".txt", ".bin"}
 
 
