@@ -21,7 +21,7 @@ from dbos import WorkflowStatusString as QueueStatus
 from dbos._core import execute_dequeued_workflow
 
 from service.schemas.names import OWN_QUEUES, JobKind
-from service.store.database import LIMITS, postgresql, sqlite_file
+from service.store.database import LIMITS, postgresql, share_sqlite, sqlite_file
 
 APPLICATION = "esc"
 QUEUE = "calibration"
@@ -59,8 +59,7 @@ def _engine(url: str, limits: str = LIMITS) -> sa.Engine:
     @sa.event.listens_for(engine, "connect")
     def _(connection: sqlite3.Connection, _: object) -> None:
         connection.isolation_level = "IMMEDIATE"
-        for pragma in ("busy_timeout=30000", "journal_mode=WAL", "foreign_keys=ON"):
-            connection.execute(f"PRAGMA {pragma}")
+        share_sqlite(connection)
 
     return engine
 

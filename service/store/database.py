@@ -4,6 +4,7 @@ import json
 import select
 import sqlite3
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -163,13 +164,32 @@ def outage_reason(error: Exception) -> str:
     return GIVEN_UP.get(str(state), "Its storage does not answer.")
 
 
+def share_sqlite(connection: sqlite3.Connection) -> None:
+    """Set up a connection to a SQLite file that other processes write to: in WAL mode, where locks are waited for."""
+    longest_s = 30
+    connection.execute(f"PRAGMA busy_timeout={1000 * longest_s}")
+    until = time.monotonic() + longest_s
+    while not _enters_wal_mode(connection, until):
+        time.sleep(0.01)
+    connection.execute("PRAGMA foreign_keys=ON")
+
+
+def _enters_wal_mode(connection: sqlite3.Connection, until: float) -> bool:
+    """Enter WAL mode; False where SQLite refuses that at once, whatever its timeout: a new file that is written to."""
+    try:
+        connection.execute("PRAGMA journal_mode=WAL")
+    except sqlite3.OperationalError as error:
+        if error.sqlite_errorcode != sqlite3.SQLITE_BUSY or time.monotonic() > until:
+            raise
+        return False
+    return True
+
+
 def _set_up_sqlite(connection: sqlite3.Connection, _: object) -> None:
     # Transactions are begun by hand below: the driver would begin one only at the first write.
     connection.isolation_level = None
-    connection.execute("PRAGMA busy_timeout=30000")
-    connection.execute("PRAGMA journal_mode=WAL")
+    share_sqlite(connection)
     connection.execute("PRAGMA synchronous=FULL")
-    connection.execute("PRAGMA foreign_keys=ON")
 
 
 def _begin_sqlite(connection: sa.Connection) -> None:

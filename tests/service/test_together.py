@@ -1,9 +1,10 @@
 """What several processes do to one home at the same moment."""
 
+import sqlite3
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
+from contextlib import closing, suppress
 from datetime import UTC, datetime, timedelta
-from threading import Barrier, BrokenBarrierError, Thread
+from threading import Barrier, BrokenBarrierError, Thread, Timer
 
 import pytest
 
@@ -95,6 +96,19 @@ def test_processes_that_start_together_make_the_schema_once(home, tmp_path):
     assert WorkerRepository(engines[0]).silent(0) == []
     for engine in engines:
         engine.dispose()
+
+
+def test_a_process_that_starts_waits_for_one_that_writes_to_the_new_file(tmp_path):
+    file = tmp_path / "esc.sqlite"
+    with closing(sqlite3.connect(file, isolation_level=None, check_same_thread=False)) as writer:
+        writer.execute("BEGIN IMMEDIATE")
+        end = Timer(0.2, writer.execute, ["COMMIT"])
+        end.start()
+        engine = connect(f"sqlite:///{file}")
+        with engine.connect() as connection:
+            assert connection.exec_driver_sql("PRAGMA journal_mode").scalar() == "wal"
+        end.join()
+    engine.dispose()
 
 
 @in_both_homes
