@@ -6,24 +6,24 @@ from typing import Annotated
 import typer
 
 from service.cli.arguments import (
-    DEFAULT_URL,
     AnswerAsJson,
-    ApiKey,
     IdempotencyKey,
     OneCamera,
     OptionsText,
-    Url,
     VenueId,
     Wait,
     parse_frame_files,
     parse_options,
 )
-from service.cli.service_client import open_client
+from service.cli.service_client import with_client
 from service.cli.waiting import end_with_job
+from service.client import Client
 from service.schemas.file_kinds import PNG_START
 
 
+@with_client
 def calibrate(
+    client: Client,
     venue: VenueId,
     frames: Annotated[
         list[str] | None,
@@ -37,32 +37,28 @@ def calibrate(
     wait: Wait = False,
     key: IdempotencyKey = None,
     as_json: AnswerAsJson = False,
-    url: Url = DEFAULT_URL,
-    api_key: ApiKey = None,
 ) -> None:
     """Submit frames to a service. Exit: 0 accepted, 1 failed, 2 usage, 3 rejected by the gate, 75 busy or away.
 
     3 as well where only some cameras are accepted. Without frames the service fetches them from the cameras' sources.
     """
     files, job_options = parse_frame_files(frames or []), parse_options(options)
-    with open_client(url, api_key) as client:
-        job = client.calibrate(venue, files, job_options.model_dump(mode="json", exclude_unset=True), key)
-        end_with_job(client, job, wait=wait, as_json=as_json)
+    job = client.calibrate(venue, files, job_options.model_dump(mode="json", exclude_unset=True), key)
+    end_with_job(client, job, wait=wait, as_json=as_json)
 
 
+@with_client
 def snapshot(
+    client: Client,
     venue: VenueId,
     camera: OneCamera = None,
     output: Annotated[Path, typer.Option("-o", "--output", file_okay=False, help="Folder to write to.")] = Path(),
-    url: Url = DEFAULT_URL,
-    api_key: ApiKey = None,
 ) -> None:
     """Save what the cameras show now, fetched by the service from their sources; prints CAMERA=FILE for each."""
-    with open_client(url, api_key) as client:
-        cameras = [camera] if camera else [one.id for one in client.venue(venue).cameras]
-        output.mkdir(parents=True, exist_ok=True)
-        for one in cameras:
-            frame = client.snapshot(venue, one)
-            file = output / f"{one}.{'png' if frame.startswith(PNG_START) else 'jpg'}"
-            file.write_bytes(frame)
-            print(f"{one}={file}")
+    cameras = [camera] if camera else [one.id for one in client.venue(venue).cameras]
+    output.mkdir(parents=True, exist_ok=True)
+    for one in cameras:
+        frame = client.snapshot(venue, one)
+        file = output / f"{one}.{'png' if frame.startswith(PNG_START) else 'jpg'}"
+        file.write_bytes(frame)
+        print(f"{one}={file}")

@@ -32,7 +32,6 @@ def check(
     site: Annotated[
         Path | None,
         typer.Option(
-            "--site",
             exists=True,
             dir_okay=False,
             help="JSON file of a venue, for its field, in place of --sport; a venue that is checked has its own.",
@@ -43,7 +42,7 @@ def check(
         typer.Option("-o", "--output", help="File or folder for the corrected calibration, in the same format."),
     ] = None,
     seed: Annotated[
-        int, typer.Option("--seed", min=0, help="Seed of the random numbers; the same seed gives the same result.")
+        int, typer.Option(min=0, help="Seed of the random numbers; the same seed gives the same result.")
     ] = 0,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON in place of a table.")] = False,
 ) -> None:

@@ -32,18 +32,17 @@ def convert(
     ],
     to: Annotated[
         FormatName | None,
-        typer.Option("--to", help="Format to write; needed unless the name of OUT tells it, as transforms.json does."),
+        typer.Option(help="Format to write; needed unless the name of OUT tells it, as transforms.json does."),
     ] = None,
     camera: Annotated[
-        list[str] | None, typer.Option("--camera", metavar="CAMERA", help="A camera to write; otherwise all.")
+        list[str] | None, typer.Option(metavar="CAMERA", help="A camera to write; otherwise all.")
     ] = None,
     crop: Annotated[
-        str | None, typer.Option("--crop", metavar="X,Y,W,H", help="Part of the picture, in its pixels, before --size.")
+        str | None, typer.Option(metavar="X,Y,W,H", help="Part of the picture, in its pixels, before --size.")
     ] = None,
-    size: Annotated[str | None, typer.Option("--size", metavar="WxH", help="Scale the picture to this size.")] = None,
+    size: Annotated[str | None, typer.Option(metavar="WxH", help="Scale the picture to this size.")] = None,
     image_size: Annotated[
-        str | None,
-        typer.Option("--image-size", metavar="WxH", help="Size of the pictures, for files that do not say it."),
+        str | None, typer.Option(metavar="WxH", help="Size of the pictures, for files that do not say it.")
     ] = None,
 ) -> None:
     """Convert a calibration to the format of another tool. Exit: 0 written, 1 failed, 2 usage.

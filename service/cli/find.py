@@ -27,10 +27,10 @@ def find(
     frames: Frames,
     output: VenueOutput,
     pictures: Annotated[
-        Path | None, typer.Option("--pictures", help="Folder for a picture of each candidate of each camera.")
+        Path | None, typer.Option(help="Folder for a picture of each candidate of each camera.")
     ] = None,
     seed: Annotated[
-        int, typer.Option("--seed", min=0, help="Seed of the random numbers; the same seed gives the same result.")
+        int, typer.Option(min=0, help="Seed of the random numbers; the same seed gives the same result.")
     ] = 0,
     as_json: AnswerAsJson = False,
 ) -> None:

@@ -49,14 +49,12 @@ def copy_home(
     blobs_from: Annotated[
         str | None,
         typer.Option(
-            "--blobs-from",
             help="Store of frames and pictures of FROM, s3: or file: URL [default: in its folder; of a database "
-            "ESC_BLOB_URL, or the folder ESC_DATA]",
+            "ESC_BLOB_URL, or the folder ESC_DATA]"
         ),
     ] = None,
     blobs_to: Annotated[
-        str | None,
-        typer.Option("--blobs-to", help="That of TO [default: in its folder; of a database that of FROM: they stay]"),
+        str | None, typer.Option(help="That of TO [default: in its folder; of a database that of FROM: they stay]")
     ] = None,
 ) -> None:
     """Copy a stopped service to another database, SQLite or PostgreSQL: all that it keeps, or nothing.

@@ -9,29 +9,26 @@ import typer
 
 from service.cli.answers import outcome_text, print_answer, print_json
 from service.cli.arguments import (
-    DEFAULT_URL,
     AnswerAsJson,
-    ApiKey,
     AsJson,
     FormatOption,
     JobId,
     LensOption,
     OneCamera,
     Output,
-    Url,
     Yes,
     check_job_id,
     require_yes,
 )
 from service.cli.printing import FAILED, USAGE, fail, print_rows, write_document
-from service.cli.service_client import open_client
+from service.cli.service_client import ServiceCommands
 from service.cli.waiting import end_with_job
 from service.client import Client, Refused
 from service.schemas.job import Jobs, newest_failed
 from service.schemas.names import JobKind, JobStatus
 from service.store.jobs.files import picture_file
 
-app = typer.Typer(
+app = ServiceCommands(
     no_args_is_help=True, help="Jobs of a running service: calibrations, and what comes before the first."
 )
 NOT_PICTURES = {"self", "events", "cancel", "venue"}
@@ -43,17 +40,15 @@ def _check_job_ids(jobs: list[str] | None) -> list[str]:
 
 @app.command("list")
 def list_jobs(
-    venue: Annotated[str | None, typer.Option("--venue", metavar="VENUE", help="Only jobs of this venue.")] = None,
-    status: Annotated[JobStatus | None, typer.Option("--status", help="Only jobs in this state.")] = None,
-    kind: Annotated[JobKind | None, typer.Option("--kind", help="Only jobs of this kind.")] = None,
-    limit: Annotated[int, typer.Option("--limit", min=1, help="Largest number of jobs.")] = 20,
+    client: Client,
+    venue: Annotated[str | None, typer.Option(metavar="VENUE", help="Only jobs of this venue.")] = None,
+    status: Annotated[JobStatus | None, typer.Option(help="Only jobs in this state.")] = None,
+    kind: Annotated[JobKind | None, typer.Option(help="Only jobs of this kind.")] = None,
+    limit: Annotated[int, typer.Option(min=1, help="Largest number of jobs.")] = 20,
     as_json: AsJson = False,
-    url: Url = DEFAULT_URL,
-    api_key: ApiKey = None,
 ) -> None:
     """Print a line per job, newest first: id, time of submission, venue, kind, status, outcome."""
-    with open_client(url, api_key) as client:
-        jobs = client.jobs(venue, status, kind, limit)
+    jobs = client.jobs(venue, status, kind, limit)
     if as_json:
         print_json(Jobs(jobs=jobs))
         return
@@ -65,21 +60,20 @@ def list_jobs(
 
 
 @app.command("get")
-def get_job(job: JobId, as_json: AnswerAsJson = False, url: Url = DEFAULT_URL, api_key: ApiKey = None) -> None:
+def get_job(client: Client, job: JobId, as_json: AnswerAsJson = False) -> None:
     """Print a job."""
-    with open_client(url, api_key) as client:
-        print_answer(client.job(job), as_json=as_json)
+    print_answer(client.job(job), as_json=as_json)
 
 
 @app.command("wait")
-def wait_for_job(job: JobId, as_json: AnswerAsJson = False, url: Url = DEFAULT_URL, api_key: ApiKey = None) -> None:
+def wait_for_job(client: Client, job: JobId, as_json: AnswerAsJson = False) -> None:
     """Follow a job to its end and print it. Exit: 0 accepted, 1 failed or cancelled, 3 rejected, 75 busy."""
-    with open_client(url, api_key) as client:
-        end_with_job(client, client.job(job), wait=True, as_json=as_json)
+    end_with_job(client, client.job(job), wait=True, as_json=as_json)
 
 
 @app.command("again")
 def submit_again(
+    client: Client,
     jobs: Annotated[
         list[str] | None,
         typer.Argument(metavar="[JOB...]", callback=_check_job_ids, help="Ids of jobs, as `esc job list` prints them."),
@@ -87,15 +81,11 @@ def submit_again(
     failed: Annotated[
         bool, typer.Option("--failed", help="Repeat each venue's newest failed job whose frames are kept.")
     ] = False,
-    venue: Annotated[
-        str | None, typer.Option("--venue", metavar="VENUE", help="With --failed: only this venue.")
-    ] = None,
+    venue: Annotated[str | None, typer.Option(metavar="VENUE", help="With --failed: only this venue.")] = None,
     wait: Annotated[
         bool, typer.Option("--wait", help="Follow the new job to its end, as `esc job wait` does.")
     ] = False,
     as_json: AnswerAsJson = False,
-    url: Url = DEFAULT_URL,
-    api_key: ApiKey = None,
 ) -> None:
     """Submit the frames and options of a job once more, as a new job that begins from the poses in use.
 
@@ -104,12 +94,11 @@ def submit_again(
     """
     if bool(jobs) == failed or (venue and not failed) or (wait and (failed or len(jobs or ()) > 1)):
         fail("Name jobs, or --failed with or without --venue; --wait is for one job", USAGE)
-    with open_client(url, api_key) as client:
-        if jobs and len(jobs) == 1:
-            end_with_job(client, client.again(jobs[0]), wait=wait, as_json=as_json)
-            return
-        ids = jobs or newest_failed(client.jobs(venue, "failed"))
-        rows = [_submit_one_again(client, job_id) for job_id in ids]
+    if jobs and len(jobs) == 1:
+        end_with_job(client, client.again(jobs[0]), wait=wait, as_json=as_json)
+        return
+    ids = jobs or newest_failed(client.jobs(venue, "failed"))
+    rows = [_submit_one_again(client, job_id) for job_id in ids]
     if as_json or not sys.stdout.isatty():
         print(
             json.dumps([{"job": job_id, "again": again, "why": why or None} for job_id, again, why in rows], indent=2)
@@ -130,6 +119,7 @@ def _submit_one_again(client: Client, job_id: str) -> tuple[str, str | None, str
 
 @app.command("picture")
 def picture_of_job(
+    client: Client,
     job: JobId,
     picture: Annotated[
         str | None,
@@ -141,65 +131,54 @@ def picture_of_job(
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="File to write; default: the picture's name, in this folder.")
     ] = None,
-    url: Url = DEFAULT_URL,
-    api_key: ApiKey = None,
 ) -> None:
     """Save a picture of a job and print its file; without a name, print the names of all."""
-    with open_client(url, api_key) as client:
-        found = client.job(job)
-        names = [name for name in found.links if name not in NOT_PICTURES]
-        if picture is None:
-            print(*names, sep="\n")
-            return
-        content = client.picture(found, picture) if picture in names else None
-        if content is None:
-            fail(f"Job {job} has no picture {picture}; it has {', '.join(names) or 'none'}.", FAILED)
-        file = output or Path(picture_file(picture.replace("/", "_")))
-        file.write_bytes(content)
-        print(file)
+    found = client.job(job)
+    names = [name for name in found.links if name not in NOT_PICTURES]
+    if picture is None:
+        print(*names, sep="\n")
+        return
+    content = client.picture(found, picture) if picture in names else None
+    if content is None:
+        fail(f"Job {job} has no picture {picture}; it has {', '.join(names) or 'none'}.", FAILED)
+    file = output or Path(picture_file(picture.replace("/", "_")))
+    file.write_bytes(content)
+    print(file)
 
 
 @app.command("poses")
 def job_poses(
+    client: Client,
     job: JobId,
     form: FormatOption = "json",
     camera: OneCamera = None,
     lens: LensOption = "stored",
     output: Output = None,
-    url: Url = DEFAULT_URL,
-    api_key: ApiKey = None,
 ) -> None:
     """Write the poses that a job found in the format of another tool."""
-    with open_client(url, api_key) as client:
-        write_document(client.job_poses(job, form, camera, lens), output)
+    write_document(client.job_poses(job, form, camera, lens), output)
 
 
 @app.command("accept")
-def accept_job(
-    job: JobId, camera: OneCamera = None, as_json: AnswerAsJson = False, url: Url = DEFAULT_URL, api_key: ApiKey = None
-) -> None:
+def accept_job(client: Client, job: JobId, camera: OneCamera = None, as_json: AnswerAsJson = False) -> None:
     """Store the poses of a job that the gate rejected or that was a dry run; confirm those of an accepted one."""
-    with open_client(url, api_key) as client:
-        print_answer(client.accept(job, camera), as_json=as_json, with_outcome=False)
+    print_answer(client.accept(job, camera), as_json=as_json, with_outcome=False)
 
 
 @app.command("reject")
-def reject_job(job: JobId, as_json: AnswerAsJson = False, url: Url = DEFAULT_URL, api_key: ApiKey = None) -> None:
+def reject_job(client: Client, job: JobId, as_json: AnswerAsJson = False) -> None:
     """Restore the poses from before a job."""
-    with open_client(url, api_key) as client:
-        print_answer(client.reject(job), as_json=as_json, with_outcome=False)
+    print_answer(client.reject(job), as_json=as_json, with_outcome=False)
 
 
 @app.command("cancel")
-def cancel_job(job: JobId, as_json: AnswerAsJson = False, url: Url = DEFAULT_URL, api_key: ApiKey = None) -> None:
+def cancel_job(client: Client, job: JobId, as_json: AnswerAsJson = False) -> None:
     """End a job that is still open."""
-    with open_client(url, api_key) as client:
-        print_answer(client.cancel(job), as_json=as_json, with_outcome=False)
+    print_answer(client.cancel(job), as_json=as_json, with_outcome=False)
 
 
 @app.command("delete")
-def delete_job(job: JobId, yes: Yes = False, url: Url = DEFAULT_URL, api_key: ApiKey = None) -> None:
+def delete_job(client: Client, job: JobId, yes: Yes = False) -> None:
     """Forget a job that has ended, with its frames and pictures. Poses that it brought to its venue stay."""
     require_yes(yes, f"Forget job {job}, its frames and its pictures")
-    with open_client(url, api_key) as client:
-        client.delete_job(job)
+    client.delete_job(job)

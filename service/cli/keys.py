@@ -27,11 +27,10 @@ app = typer.Typer(no_args_is_help=True, help="API keys, in the database of this 
 def add_key(
     name: Annotated[str, typer.Argument(help="Name of the key, for example the machine or person that will use it.")],
     scope: Annotated[
-        Scope,
-        typer.Option("--scope", help="Scope: read; calibrate, which includes read; admin, which includes both."),
+        Scope, typer.Option(help="Scope: read; calibrate, which includes read; admin, which includes both.")
     ],
     days: Annotated[
-        int | None, typer.Option("--days", min=1, max=36500, help="Days until the key expires; default: never.")
+        int | None, typer.Option(min=1, max=36500, help="Days until the key expires; default: never.")
     ] = None,
     venues: Annotated[
         list[str] | None,
@@ -73,7 +72,7 @@ def list_keys(data: Data = None) -> None:
 def rotate_key(
     name: Annotated[str, typer.Argument(help="Name of the key, as `esc key list` prints it.")],
     grace: Annotated[
-        str, typer.Option("--grace", metavar="TIME", help="How long the old key still works, such as 30m, 24h or 7d.")
+        str, typer.Option(metavar="TIME", help="How long the old key still works, such as 30m, 24h or 7d.")
     ] = "24h",
     data: Data = None,
 ) -> None:

@@ -77,12 +77,11 @@ def live(
     ] = None,
     hold: Annotated[bool, typer.Option("--hold", help="Send only the stored poses, as without any stream.")] = False,
     follow_every: Annotated[
-        int, typer.Option("--follow-every", min=1, max=25, metavar="N", help="Measure in every Nth picture only.")
+        int, typer.Option(min=1, max=25, metavar="N", help="Measure in every Nth picture only.")
     ] = 1,
     predict: Annotated[
         float,
         typer.Option(
-            "--predict",
             min=0,
             max=1000,
             metavar="MS",
@@ -90,12 +89,11 @@ def live(
         ),
     ] = 0,
     rate: Annotated[
-        str, typer.Option("--rate", metavar="FPS", help="Samples of stored poses a second: 25, 50 or 30000/1001.")
+        str, typer.Option(metavar="FPS", help="Samples of stored poses a second: 25, 50 or 30000/1001.")
     ] = "25",
     opentrackio: Annotated[
         list[str] | None,
         typer.Option(
-            "--opentrackio",
             metavar="HOST[:PORT]|multicast",
             help="Send OpenTrackIO 1.0.1 there; multicast: camera N of the venue to 239.135.1.N:55555, as is done "
             "where no destination is given.",
@@ -105,33 +103,24 @@ def live(
         bool, typer.Option("--cbor", help="Send OpenTrackIO as CBOR, in fewer bytes than JSON. Needs the extra `cbor`.")
     ] = False,
     clock: Annotated[
-        ClockSource,
-        typer.Option("--clock", help="Source that the clock of this machine follows, as samples of OpenTrackIO say."),
+        ClockSource, typer.Option(help="Source that the clock of this machine follows, as samples of OpenTrackIO say.")
     ] = "ntp",
-    freed: Annotated[
-        list[str] | None, typer.Option("--freed", metavar="HOST:PORT", help="Send FreeD D1 packets there.")
-    ] = None,
+    freed: Annotated[list[str] | None, typer.Option(metavar="HOST:PORT", help="Send FreeD D1 packets there.")] = None,
     zoom: Annotated[
         list[str] | None,
         typer.Option(
-            "--zoom",
             metavar="CAMERA=COUNT",
             help="Send this count as the zoom of a camera by FreeD, 0 to 16777215, whatever table the venue has.",
         ),
     ] = None,
-    focus: Annotated[
-        list[str] | None, typer.Option("--focus", metavar="CAMERA=COUNT", help="The same as its focus.")
-    ] = None,
+    focus: Annotated[list[str] | None, typer.Option(metavar="CAMERA=COUNT", help="The same as its focus.")] = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print a line of JSON for each sample on standard output.")
     ] = False,
     interface: Annotated[
         str | None,
         typer.Option(
-            "--interface",
-            metavar="IP",
-            callback=_check_interface,
-            help="Address of the network interface that multicast leaves by.",
+            metavar="IP", callback=_check_interface, help="Address of the network interface that multicast leaves by."
         ),
     ] = None,
     recover: Annotated[

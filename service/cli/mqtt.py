@@ -32,16 +32,15 @@ def mqtt(
     broker: Annotated[
         str,
         typer.Option(
-            "--broker",
             envvar="ESC_MQTT_BROKER",
             metavar="URL",
             help="Such as mqtt://user@10.1.0.9, or mqtts:// with TLS. The password: ESC_MQTT_PASSWORD, or the file "
             "that ESC_MQTT_PASSWORD_FILE names; an authority of one's own: SSL_CERT_FILE.",
         ),
     ],
-    topic: Annotated[str, typer.Option("--topic", help="First level of the topics.")] = "esc",
+    topic: Annotated[str, typer.Option(help="First level of the topics.")] = "esc",
     discovery: Annotated[
-        str, typer.Option("--discovery", metavar="PREFIX", help="Discovery prefix of Home Assistant.")
+        str, typer.Option(metavar="PREFIX", help="Discovery prefix of Home Assistant.")
     ] = "homeassistant",
     url: Url = DEFAULT_URL,
     api_key: ApiKey = None,

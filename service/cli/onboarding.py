@@ -73,14 +73,9 @@ def intrinsics(
         ),
     ],
     board: Annotated[
-        str,
-        typer.Option(
-            "--board", metavar="9x6", help="Inner corners of the board across and down, where four squares meet."
-        ),
+        str, typer.Option(metavar="9x6", help="Inner corners of the board across and down, where four squares meet.")
     ],
-    square: Annotated[
-        float, typer.Option("--square", metavar="METRES", help="Side of a square of the board, in metres.")
-    ],
+    square: Annotated[float, typer.Option(metavar="METRES", help="Side of a square of the board, in metres.")],
     output: Annotated[
         Path,
         typer.Option(
@@ -89,15 +84,13 @@ def intrinsics(
     ],
     charuco: Annotated[
         str | None,
-        typer.Option(
-            "--charuco", metavar="4X4_50:0.022", help="For a ChArUco board: dictionary, and side of a marker in metres."
-        ),
+        typer.Option(metavar="4X4_50:0.022", help="For a ChArUco board: dictionary, and side of a marker in metres."),
     ] = None,
     model: Annotated[
-        BoardLensModel, typer.Option("--model", help="Lens model: opencv, or fisheye (Kannala-Brandt) for wide ones.")
+        BoardLensModel, typer.Option(help="Lens model: opencv, or fisheye (Kannala-Brandt) for wide ones.")
     ] = "opencv",
     picture: Annotated[
-        Path | None, typer.Option("--picture", help="JPEG file to draw into where in the frame the board was seen.")
+        Path | None, typer.Option(help="JPEG file to draw into where in the frame the board was seen.")
     ] = None,
 ) -> None:
     """Find the lens of a camera from photos of a chessboard. Exit: 0 found (read the warnings), 1 not, 2 usage."""
@@ -142,9 +135,9 @@ def pose(
     output: VenueOutput,
     frame: Annotated[
         list[str] | None,
-        typer.Option("--frame", metavar="CAMERA=FILE", help="The frame that the points of a camera were clicked in."),
+        typer.Option(metavar="CAMERA=FILE", help="The frame that the points of a camera were clicked in."),
     ] = None,
-    pictures: Annotated[Path | None, typer.Option("--pictures", help="Folder for a picture per camera.")] = None,
+    pictures: Annotated[Path | None, typer.Option(help="Folder for a picture per camera.")] = None,
     as_json: AnswerAsJson = False,
     _: Annotated[
         str | None,
@@ -209,13 +202,11 @@ def fit_field(
             "-o", "--output", callback=require_folder_of, help="JSON file to write the venue with its fitted field to."
         ),
     ],
-    pictures: Annotated[Path | None, typer.Option("--pictures", help="Folder for a picture per camera.")] = None,
+    pictures: Annotated[Path | None, typer.Option(help="Folder for a picture per camera.")] = None,
     seed: Annotated[
         int | None,
         typer.Option(
-            "--seed",
-            min=0,
-            help="Seed of the random numbers; the same seed gives the same result. Default: a random one.",
+            min=0, help="Seed of the random numbers; the same seed gives the same result. Default: a random one."
         ),
     ] = None,
     as_json: AnswerAsJson = False,

@@ -34,10 +34,10 @@ def plan(
         ),
     ],
     lines: Annotated[
-        LineStateName, typer.Option("--lines", help="State of the lines: freshly painted, worn, or under floodlight.")
+        LineStateName, typer.Option(help="State of the lines: freshly painted, worn, or under floodlight.")
     ] = "fresh",
     hidden: Annotated[
-        float, typer.Option("--hidden", min=0, max=0.9, help="Share of the lines that something covers, 0 to 0.9.")
+        float, typer.Option(min=0, max=0.9, help="Share of the lines that something covers, 0 to 0.9.")
     ] = 0.0,
     as_json: AnswerAsJson = False,
 ) -> None:

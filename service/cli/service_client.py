@@ -1,20 +1,58 @@
 """The client that commands call a service with; exit with a line where it refuses or cannot be reached."""
 
+import inspect
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import wraps
 from pathlib import Path
+from typing import Any, TypeVar
 
 import httpx
+import typer
 
 from service import build
-from service.cli.arguments import parse_document
+from service.cli.arguments import DEFAULT_URL, ApiKey, Url, parse_document
 from service.cli.printing import BUSY, FAILED, USAGE, fail, key_hint, print_note, problem_text
 from service.client import Client, NotUnderstood, Refused
 from service.schemas.names import ID_PATTERN
 from service.schemas.venue import Venue, VenueIn
 from service.variable_names import misspelt_for_client
+
+Command = TypeVar("Command", bound=Callable[..., None])
+
+
+class ServiceCommands(typer.Typer):
+    """A group of commands, each of which calls a service, see `with_client`."""
+
+    def command(self, name: str, **attributes: Any) -> Callable[[Command], Command]:  # type: ignore[override]
+        """Add a command, whose first parameter is the client."""
+
+        def add(command: Command) -> Command:
+            super(ServiceCommands, self).command(name, **attributes)(with_client(command))
+            return command
+
+        return add
+
+
+def with_client(command: Callable[..., None]) -> Callable[..., None]:
+    """Return a command with --url and --api-key, which runs with a client of that service as its first argument."""
+
+    @wraps(command)
+    def run(url: str, api_key: str | None, **arguments: Any) -> None:
+        with open_client(url, api_key) as client:
+            command(client, **arguments)
+
+    signature = inspect.signature(command)
+    _, *own = signature.parameters.values()
+    of_service = [
+        inspect.Parameter("url", inspect.Parameter.KEYWORD_ONLY, default=DEFAULT_URL, annotation=Url),
+        inspect.Parameter("api_key", inspect.Parameter.KEYWORD_ONLY, default=None, annotation=ApiKey),
+    ]
+    # Typer reads the options of a command from its signature.
+    run.__signature__ = signature.replace(parameters=[*own, *of_service])  # type: ignore[attr-defined]
+    return run
 
 
 @contextmanager

@@ -49,7 +49,6 @@ def stitch(
     offset: Annotated[
         list[str] | None,
         typer.Option(
-            "--offset",
             metavar="CAMERA=SECONDS",
             help="How much later a camera's clip began than the first one: right=0.120, or in frames of its own, "
             "right=3f. Otherwise found by what moves where both see, or by the clocks of cameras (RTSP).",
@@ -57,15 +56,11 @@ def stitch(
     ] = None,
     audio: Annotated[
         str | None,
-        typer.Option(
-            "--audio", metavar="CAMERA|none", help="Camera whose sound is kept; default: the first clip with sound."
-        ),
+        typer.Option(metavar="CAMERA|none", help="Camera whose sound is kept; default: the first clip with sound."),
     ] = None,
     rate: Annotated[
         str | None,
-        typer.Option(
-            "--rate", metavar="FPS", help="Pictures a second, 25 or 30000/1001; otherwise those of the first clip."
-        ),
+        typer.Option(metavar="FPS", help="Pictures a second, 25 or 30000/1001; otherwise those of the first clip."),
     ] = None,
     begin: Annotated[
         str | None,
@@ -77,32 +72,27 @@ def stitch(
         typer.Option("--allow-missing", help="Go on without cameras whose clip is missing or has ended."),
     ] = False,
     projection: ProjectionOption = None,
-    width: Annotated[int | None, typer.Option("--width", min=64, max=8192, help="In pixels, even.")] = None,
+    width: Annotated[int | None, typer.Option(min=64, max=8192, help="In pixels, even.")] = None,
     height: Height = None,
     field_of_view: FieldOfView = None,
-    pan: Annotated[float | None, typer.Option("--pan", min=-180, max=180, help="To the right, in degrees.")] = None,
+    pan: Annotated[float | None, typer.Option(min=-180, max=180, help="To the right, in degrees.")] = None,
     horizon: Horizon = None,
-    codec: Annotated[str, typer.Option("--codec", help="Encoder, any that PyAV has.")] = "libx264",
-    crf: Annotated[
-        int, typer.Option("--crf", min=0, max=51, help="Quality of libx264 and libx265, 0 loses nothing.")
-    ] = 20,
-    preset: Annotated[
-        str, typer.Option("--preset", help="Preset of libx264 and libx265, ultrafast to veryslow.")
-    ] = "veryfast",
+    codec: Annotated[str, typer.Option(help="Encoder, any that PyAV has.")] = "libx264",
+    crf: Annotated[int, typer.Option(min=0, max=51, help="Quality of libx264 and libx265, 0 loses nothing.")] = 20,
+    preset: Annotated[str, typer.Option(help="Preset of libx264 and libx265, ultrafast to veryslow.")] = "veryfast",
     seam: Annotated[
         Literal["static", "people"],
-        typer.Option("--seam", help="Seams stay where they are, or go around people, whom one camera shows whole."),
+        typer.Option(help="Seams stay where they are, or go around people, whom one camera shows whole."),
     ] = "static",
     follow: Annotated[
         bool, typer.Option("--follow", help="Cameras shake: find where each is in every picture, by its lines.")
     ] = False,
     follow_every: Annotated[
-        int, typer.Option("--follow-every", min=1, max=25, metavar="N", help="Measure in every Nth picture only.")
+        int, typer.Option(min=1, max=25, metavar="N", help="Measure in every Nth picture only.")
     ] = 1,
     poses_out: Annotated[
         Path | None,
         typer.Option(
-            "--poses-out",
             metavar="STEM",
             help="With --follow: the poses of every picture, as STEM.jsonl (OpenTrackIO), STEM.d1 (FreeD), STEM.csv.",
         ),

@@ -9,12 +9,9 @@ import typer
 
 from service.cli.answers import job_exit_code, print_answer, print_submitted, write_pictures
 from service.cli.arguments import (
-    DEFAULT_URL,
     AnswerAsJson,
-    ApiKey,
     Frames,
     IdempotencyKey,
-    Url,
     VenueId,
     Wait,
     check_id,
@@ -24,8 +21,8 @@ from service.cli.arguments import (
     parse_frame_files,
 )
 from service.cli.printing import USAGE, fail, print_note
-from service.cli.service_client import open_client
 from service.cli.waiting import follow_to_end
+from service.client import Client
 from service.schemas.find import SoughtSite
 from service.schemas.names import FieldNumber
 from service.schemas.options import FindOptions
@@ -71,18 +68,16 @@ Candidates = Annotated[
 
 
 def find_cameras(
+    client: Client,
     venue: VenueId,
     frames: Frames,
     sport: Annotated[
         str | None,
-        typer.Option(
-            "--sport", help="Sport of a venue that is not stored yet: football, tennis ... in its usual measures."
-        ),
+        typer.Option(help="Sport of a venue that is not stored yet: football, tennis ... in its usual measures."),
     ] = None,
     site: Annotated[
         Path | None,
         typer.Option(
-            "--site",
             metavar="SITE.json",
             exists=True,
             dir_okay=False,
@@ -92,7 +87,6 @@ def find_cameras(
     options: Annotated[
         str,
         typer.Option(
-            "--options",
             metavar="JSON",
             help='For a stored venue: {"cameras": ["left"]} looks for these alone, {"find_lens": '
             'true} finds lenses as well, {"position_radius_m": 2} looks within 2 m of the stored place.',
@@ -103,12 +97,10 @@ def find_cameras(
         bool, typer.Option("--adopt", help="Follow the job, and store the cameras if all are accepted.")
     ] = False,
     pictures: Annotated[
-        Path | None, typer.Option("--pictures", help="Folder for a picture of each candidate of each camera; waits.")
+        Path | None, typer.Option(help="Folder for a picture of each candidate of each camera; waits.")
     ] = None,
     key: IdempotencyKey = None,
     as_json: AnswerAsJson = False,
-    url: Url = DEFAULT_URL,
-    api_key: ApiKey = None,
 ) -> None:
     """Find cameras of a venue from their frames alone. Exit: 0 all found, 1 failed, 2 usage, 3 not all, or not sure.
 
@@ -118,30 +110,28 @@ def find_cameras(
     files = parse_frame_files(frames)
     find_options = parse_document(FindOptions, options, "--options")
     sought = _sought_site(venue, files, sport, site)
-    with open_client(url, api_key) as client:
-        job = client.find(venue, files, find_options.model_dump(mode="json", exclude_unset=True), sought, key)
-        if not (wait or adopt_them or pictures):
-            print_submitted(job, client.url_of(job.links["self"]), as_json=as_json)
-            return
-        job = follow_to_end(client, job)
-        print_answer(job, as_json=as_json)
-        if isinstance(job.result, FindResult):
-            if pictures is not None:
-                candidates = [name for name in job.links if name.startswith(f"{CANDIDATE}/")]
-                drawn = {name: client.picture(job, name) for name in candidates}
-                write_pictures(pictures, {name: picture for name, picture in drawn.items() if picture is not None})
-            if adopt_them and job.result.accepted:
-                client.adopt_found(venue, job.id)
-                print_note(f"Stored: venue {venue} has these cameras now.")
-                print_note(f"To calibrate with the same frames: esc venue adopt {venue} --found {job.id} --calibrate")
-            elif adopt_them:
-                print_note(
-                    f"Nothing is stored. To choose: esc venue adopt {venue} --found {job.id} --candidate CAMERA=N"
-                )
+    job = client.find(venue, files, find_options.model_dump(mode="json", exclude_unset=True), sought, key)
+    if not (wait or adopt_them or pictures):
+        print_submitted(job, client.url_of(job.links["self"]), as_json=as_json)
+        return
+    job = follow_to_end(client, job)
+    print_answer(job, as_json=as_json)
+    if isinstance(job.result, FindResult):
+        if pictures is not None:
+            candidates = [name for name in job.links if name.startswith(f"{CANDIDATE}/")]
+            drawn = {name: client.picture(job, name) for name in candidates}
+            write_pictures(pictures, {name: picture for name, picture in drawn.items() if picture is not None})
+        if adopt_them and job.result.accepted:
+            client.adopt_found(venue, job.id)
+            print_note(f"Stored: venue {venue} has these cameras now.")
+            print_note(f"To calibrate with the same frames: esc venue adopt {venue} --found {job.id} --calibrate")
+        elif adopt_them:
+            print_note(f"Nothing is stored. To choose: esc venue adopt {venue} --found {job.id} --candidate CAMERA=N")
     raise typer.Exit(job_exit_code(job))
 
 
 def adopt(
+    client: Client,
     venue: VenueId,
     camera: AdoptedCamera = None,
     field: AdoptedField = None,
@@ -150,8 +140,6 @@ def adopt(
     candidate: Candidates = None,
     calibrate: CalibrateFound = False,
     as_json: AnswerAsJson = False,
-    url: Url = DEFAULT_URL,
-    api_key: ApiKey = None,
 ) -> None:
     """Store what the lines of a job say of a lens, of the field, or of where cameras stand, as a new revision.
 
@@ -164,15 +152,14 @@ def adopt(
     if not one_of_three or (field is None) != (job is None) or ((candidate or calibrate) and found is None):
         raise typer.BadParameter("name a CAMERA, or a number of the field with --field and --job, or --found JOB")
     choice = _parse_candidates(candidate or ())
-    with open_client(url, api_key) as client:
-        if camera is not None:
-            print_answer(client.adopt_refined(venue, camera), as_json=as_json)
-        elif field is not None and job is not None:
-            print_answer(client.adopt_field(venue, job, field), as_json=as_json)
-        elif found is not None:
-            print_answer(client.adopt_found(venue, found, choice), as_json=as_json)
-            if calibrate:
-                print_note(f"Job {client.calibrate_found(found).id} calibrates it with the frames of the search.")
+    if camera is not None:
+        print_answer(client.adopt_refined(venue, camera), as_json=as_json)
+    elif field is not None and job is not None:
+        print_answer(client.adopt_field(venue, job, field), as_json=as_json)
+    elif found is not None:
+        print_answer(client.adopt_found(venue, found, choice), as_json=as_json)
+        if calibrate:
+            print_note(f"Job {client.calibrate_found(found).id} calibrates it with the frames of the search.")
 
 
 def _sought_site(

@@ -6,10 +6,9 @@ from typing import Annotated
 import typer
 
 from service.cli.answers import outcome_text, print_answer, print_json
-from service.cli.arguments import DEFAULT_URL, AnswerAsJson, ApiKey, AsJson, Url, VenueId
+from service.cli.arguments import AnswerAsJson, AsJson, VenueId
 from service.cli.printing import REJECTED, USAGE, fail, print_note, print_rows
-from service.cli.service_client import open_client
-from service.client import PATIENCE_S
+from service.client import PATIENCE_S, Client
 from service.schemas.actor import Actor
 from service.schemas.events.venue_event import Event, Poses
 from service.schemas.geometry import Moved
@@ -21,15 +20,13 @@ from service.schemas.trend import Trend
 
 
 def venue_history(
+    client: Client,
     venue: VenueId,
-    limit: Annotated[int, typer.Option("--limit", min=1, help="Largest number, the newest first.")] = 20,
+    limit: Annotated[int, typer.Option(min=1, help="Largest number, the newest first.")] = 20,
     as_json: AsJson = False,
-    url: Url = DEFAULT_URL,
-    api_key: ApiKey = None,
 ) -> None:
     """Print a line per change of the poses, newest first: revision, time, cause, job, pixels moved and drifted, who."""
-    with open_client(url, api_key) as client:
-        revisions = client.history(venue, limit)
+    revisions = client.history(venue, limit)
     if as_json:
         print_json(History(revisions=revisions))
         return
@@ -43,25 +40,23 @@ def venue_history(
 
 
 def venue_trend(
+    client: Client,
     venue: VenueId,
     camera: Annotated[
         str | None, typer.Argument(metavar="[CAMERA]", help="Night by night; otherwise a line for each camera.")
     ] = None,
     since: Annotated[
-        str | None, typer.Option("--since", metavar="YYYY-MM-DD", help="The first night to print, a day of UTC.")
+        str | None, typer.Option(metavar="YYYY-MM-DD", help="The first night to print, a day of UTC.")
     ] = None,
     as_json: AsJson = False,
-    url: Url = DEFAULT_URL,
-    api_key: ApiKey = None,
 ) -> None:
     """Print how cameras have moved since their anchor, in cm at the far touchline, and what control charts say of it.
 
     A line per camera: id, state, cm, words. Of one camera, a line per night: time, state, cm, one sigma, focal length.
     """
     first = _parse_day(since)
-    with open_client(url, api_key) as client:
-        ids = [camera] if camera else [one.id for one in client.venue(venue).cameras]
-        trends = [client.trend(venue, one, first) for one in ids]
+    ids = [camera] if camera else [one.id for one in client.venue(venue).cameras]
+    trends = [client.trend(venue, one, first) for one in ids]
     if as_json:
         print(*(trend.model_dump_json() for trend in trends), sep="\n")
     elif camera is None:
@@ -71,31 +66,28 @@ def venue_trend(
         _print_nights(trends[0])
 
 
-def venue_health(venue: VenueId, as_json: AnswerAsJson = False, url: Url = DEFAULT_URL, api_key: ApiKey = None) -> None:
+def venue_health(client: Client, venue: VenueId, as_json: AnswerAsJson = False) -> None:
     """Print how a venue is doing: alarms, drift, schedule. Exit: 0 ok, 3 an alarm rings."""
-    with open_client(url, api_key) as client:
-        health = client.venue_health(venue)
+    health = client.venue_health(venue)
     print_answer(health, as_json=as_json)
     if health.state != "ok":
         raise typer.Exit(REJECTED)
 
 
 def follow_venue(
+    client: Client,
     venue: VenueId,
-    only: Annotated[EventKind | None, typer.Option("--only", help="Only events of this kind; default: all.")] = None,
+    only: Annotated[EventKind | None, typer.Option(help="Only events of this kind; default: all.")] = None,
     as_json: AsJson = False,
-    url: Url = DEFAULT_URL,
-    api_key: ApiKey = None,
 ) -> None:
     """Print a line for whatever happens to a venue: time, type, what; first for the poses in use.
 
     Nothing is missed when the service restarts. Exit: 0 the venue was deleted, 75 the service was away for a minute.
     """
-    with open_client(url, api_key) as client:
-        for _, event in client.venue_events(venue, [only] if only else [], patience_s=PATIENCE_S):
-            line = f"{event.timestamp:%Y-%m-%dT%H:%M:%SZ}\t{event.type}\t{_event_text(event)}"
-            # Whoever reads a pipe is to have it now.
-            print(event.model_dump_json() if as_json else line, flush=True)
+    for _, event in client.venue_events(venue, [only] if only else [], patience_s=PATIENCE_S):
+        line = f"{event.timestamp:%Y-%m-%dT%H:%M:%SZ}\t{event.type}\t{_event_text(event)}"
+        # Whoever reads a pipe is to have it now.
+        print(event.model_dump_json() if as_json else line, flush=True)
 
 
 def _event_text(event: Event) -> str:

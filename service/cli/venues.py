@@ -10,9 +10,7 @@ import typer
 
 from service.cli.answers import print_answer, print_json
 from service.cli.arguments import (
-    DEFAULT_URL,
     AnswerAsJson,
-    ApiKey,
     AsJson,
     FieldOfView,
     FieldSize,
@@ -24,7 +22,6 @@ from service.cli.arguments import (
     Output,
     ProjectionOption,
     Sport,
-    Url,
     VenueId,
     Yes,
     parse_document,
@@ -33,7 +30,7 @@ from service.cli.arguments import (
 )
 from service.cli.convert import read_calibration
 from service.cli.printing import FAILED, USAGE, fail, print_note, print_rows, write_document
-from service.cli.service_client import open_client
+from service.cli.service_client import ServiceCommands
 from service.cli.venue_edits import describe_losses, edit_text, merge_patch_between, parse_patch, with_poses_of
 from service.cli.venue_find import adopt, find_cameras
 from service.cli.venue_reports import follow_venue, venue_health, venue_history, venue_trend
@@ -46,11 +43,12 @@ from service.schemas.venue import Venue, VenueIn
 WAYS_TO_PUT = (
     "Keep the poses with --keep-poses, change parts with esc venue set or edit, or put it anyway with --force."
 )
-app = typer.Typer(no_args_is_help=True, help="Venues: pitch, cameras, stored poses.")
+app = ServiceCommands(no_args_is_help=True, help="Venues: pitch, cameras, stored poses.")
 
 
 @app.command("put")
 def put_venue(
+    client: Client,
     file: Annotated[
         Path,
         typer.Argument(
@@ -61,9 +59,7 @@ def put_venue(
     ],
     sport: Sport = None,
     size: FieldSize = None,
-    id: Annotated[
-        str | None, typer.Option("--id", help="With --sport: id of the venue; otherwise the file's name.")
-    ] = None,
+    id: Annotated[str | None, typer.Option(help="With --sport: id of the venue; otherwise the file's name.")] = None,
     keep_poses: Annotated[
         bool,
         typer.Option("--keep-poses", help="Keep the stored poses, lenses and ridge, whatever the file says."),
@@ -72,8 +68,6 @@ def put_venue(
         bool, typer.Option("--force", help="Store the file even if poses, alarms, a schedule or sources are lost.")
     ] = False,
     as_json: AnswerAsJson = False,
-    url: Url = DEFAULT_URL,
-    api_key: ApiKey = None,
 ) -> None:
     """Create or replace a venue from a file. Exit 1: nothing was put, something would be lost by it.
 
@@ -83,17 +77,16 @@ def put_venue(
         venue = parse_document(VenueIn, file.read_bytes(), str(file))
     else:
         venue = _venue_of_calibration(file, parse_field(sport, size), id or id_like(file.stem))
-    with open_client(url, api_key) as client:
-        before = _stored_venue(client, venue.id)
-        if before is None:
-            print_answer(client.put_venue(venue), as_json=as_json)
-            return
-        stored, tag = before
-        new = with_poses_of(venue, stored) if keep_poses else venue
-        losses = describe_losses(new.to_venue(), stored, client.history(venue.id, 1)[0])
-        if losses and not force:
-            fail("\n  ".join([f"Nothing was put. Venue {venue.id} would lose", *losses, WAYS_TO_PUT]), FAILED)
-        print_answer(client.put_venue(new, tag), as_json=as_json)
+    before = _stored_venue(client, venue.id)
+    if before is None:
+        print_answer(client.put_venue(venue), as_json=as_json)
+        return
+    stored, tag = before
+    new = with_poses_of(venue, stored) if keep_poses else venue
+    losses = describe_losses(new.to_venue(), stored, client.history(venue.id, 1)[0])
+    if losses and not force:
+        fail("\n  ".join([f"Nothing was put. Venue {venue.id} would lose", *losses, WAYS_TO_PUT]), FAILED)
+    print_answer(client.put_venue(new, tag), as_json=as_json)
 
 
 def _venue_of_calibration(file: Path, field: FieldOfPlay, id: str) -> VenueIn:
@@ -109,6 +102,7 @@ def _venue_of_calibration(file: Path, field: FieldOfPlay, id: str) -> VenueIn:
 
 @app.command("set")
 def set_venue(
+    client: Client,
     venue: VenueId,
     changes: Annotated[
         list[str],
@@ -119,43 +113,37 @@ def set_venue(
         ),
     ],
     as_json: AnswerAsJson = False,
-    url: Url = DEFAULT_URL,
-    api_key: ApiKey = None,
 ) -> None:
     """Change parts of a venue; the others, such as its poses, stay."""
     patch = parse_patch(changes)
-    with open_client(url, api_key) as client:
-        print_answer(client.patch_venue(venue, patch), as_json=as_json)
+    print_answer(client.patch_venue(venue, patch), as_json=as_json)
 
 
 @app.command("edit")
-def edit_venue(venue: VenueId, as_json: AnswerAsJson = False, url: Url = DEFAULT_URL, api_key: ApiKey = None) -> None:
+def edit_venue(client: Client, venue: VenueId, as_json: AnswerAsJson = False) -> None:
     """Open a venue in $EDITOR and change what was changed there, unless somebody else has changed it meanwhile."""
-    with open_client(url, api_key) as client:
-        stored, tag = client.tagged_venue(venue)
-        document = stored.to_input().model_dump(mode="json", exclude_none=True)
-        try:
-            patch = merge_patch_between(document, json.loads(edit_text(json.dumps(document, indent=2) + "\n")))
-        except ValueError as error:
-            fail(f"Nothing was changed. What was saved is no JSON: {error}", USAGE)
-        if not patch:
-            print_note("Nothing was changed.")
-            return
-        print_answer(client.patch_venue(venue, patch, tag), as_json=as_json)
+    stored, tag = client.tagged_venue(venue)
+    document = stored.to_input().model_dump(mode="json", exclude_none=True)
+    try:
+        patch = merge_patch_between(document, json.loads(edit_text(json.dumps(document, indent=2) + "\n")))
+    except ValueError as error:
+        fail(f"Nothing was changed. What was saved is no JSON: {error}", USAGE)
+    if not patch:
+        print_note("Nothing was changed.")
+        return
+    print_answer(client.patch_venue(venue, patch, tag), as_json=as_json)
 
 
 @app.command("get")
-def get_venue(venue: VenueId, as_json: AnswerAsJson = False, url: Url = DEFAULT_URL, api_key: ApiKey = None) -> None:
+def get_venue(client: Client, venue: VenueId, as_json: AnswerAsJson = False) -> None:
     """Print a venue with the poses in use."""
-    with open_client(url, api_key) as client:
-        print_answer(client.venue(venue), as_json=as_json)
+    print_answer(client.venue(venue), as_json=as_json)
 
 
 @app.command("list")
-def list_venues(as_json: AsJson = False, url: Url = DEFAULT_URL, api_key: ApiKey = None) -> None:
+def list_venues(client: Client, as_json: AsJson = False) -> None:
     """Print a line per venue: id, name, cameras."""
-    with open_client(url, api_key) as client:
-        listed = client.venue_list()
+    listed = client.venue_list()
     if as_json:
         print_json(listed)
         return
@@ -166,45 +154,41 @@ def list_venues(as_json: AsJson = False, url: Url = DEFAULT_URL, api_key: ApiKey
 
 
 @app.command("delete")
-def delete_venue(venue: VenueId, yes: Yes = False, url: Url = DEFAULT_URL, api_key: ApiKey = None) -> None:
+def delete_venue(client: Client, venue: VenueId, yes: Yes = False) -> None:
     """Forget a venue and the history of its poses. Its jobs stay, with frames and pictures, see `esc job delete`."""
     require_yes(yes, f"Forget venue {venue} and the history of its poses")
-    with open_client(url, api_key) as client:
-        client.delete_venue(venue)
+    client.delete_venue(venue)
     print_note(f"Venue {venue} and the history of its poses are deleted; its jobs stay: esc job list --venue {venue}")
 
 
 @app.command("poses")
 def venue_poses(
+    client: Client,
     venue: VenueId,
     form: FormatOption = "json",
     camera: OneCamera = None,
     lens: LensOption = "stored",
     output: Output = None,
-    url: Url = DEFAULT_URL,
-    api_key: ApiKey = None,
 ) -> None:
     """Write the poses in use in the format of another tool."""
-    with open_client(url, api_key) as client:
-        write_document(client.venue_poses(venue, form, camera, lens), output)
+    write_document(client.venue_poses(venue, form, camera, lens), output)
 
 
 @app.command("stitch")
 def venue_stitch(
+    client: Client,
     venue: VenueId,
     form: Annotated[StitchFormat, typer.Option("--format", help="Program that stitches with it.")] = "ffmpeg",
     projection: ProjectionOption = None,
-    width: Annotated[int | None, typer.Option("--width", help="In pixels, even.")] = None,
+    width: Annotated[int | None, typer.Option(help="In pixels, even.")] = None,
     height: Height = None,
     field_of_view: FieldOfView = None,
-    pan: Annotated[float | None, typer.Option("--pan", help="To the right, in degrees.")] = None,
+    pan: Annotated[float | None, typer.Option(help="To the right, in degrees.")] = None,
     horizon: Horizon = None,
     output: Output = None,
     if_changed: Annotated[
         bool, typer.Option("--if-changed", help="Fetch the zip only if the file of -o is out of date.")
     ] = False,
-    url: Url = DEFAULT_URL,
-    api_key: ApiKey = None,
 ) -> None:
     """Write the zip with which ffmpeg, compositors or OpenCV stitch: maps, weights and lights of each camera.
 
@@ -222,8 +206,7 @@ def venue_stitch(
         "horizon": horizon,
     }
     view = {name: value for name, value in parts.items() if value is not None}
-    with open_client(url, api_key) as client:
-        package = client.venue_stitch(venue, form, view, etag)
+    package = client.venue_stitch(venue, form, view, etag)
     if package is None:
         print_note(f"{output} is up to date.")
     else:
@@ -238,15 +221,13 @@ app.command("follow")(follow_venue)
 
 @app.command("restore")
 def restore_venue(
+    client: Client,
     venue: VenueId,
     revision: Annotated[int, typer.Argument(min=1, help="Number of the revision, as `esc venue history` prints it.")],
     as_json: AnswerAsJson = False,
-    url: Url = DEFAULT_URL,
-    api_key: ApiKey = None,
 ) -> None:
     """Restore the poses of a revision of `esc venue history`."""
-    with open_client(url, api_key) as client:
-        print_answer(client.restore(venue, revision), as_json=as_json)
+    print_answer(client.restore(venue, revision), as_json=as_json)
 
 
 app.command("find")(find_cameras)

@@ -18,8 +18,7 @@ def worker(
     name: Annotated[
         str | None,
         typer.Option(
-            "--name",
-            help="Name of the worker, unique and the same after a restart (ESC_WORKER_NAME) [default: the host's]",
+            help="Name of the worker, unique and the same after a restart (ESC_WORKER_NAME) [default: the host's]"
         ),
     ] = None,
 ) -> None:
