@@ -123,7 +123,7 @@ class TrackedStreams:
         if tracked.how == "measured":
             self._trouble[tracked.camera.id].over(f"camera {tracked.camera.id} is tracked again")
         self._last_s[tracked.camera.id] = time.monotonic()
-        shot = NumberedCamera(camera_document(tracked.camera), self.numbers[tracked.camera.id])
+        camera = NumberedCamera(camera_document(tracked.camera), self.numbers[tracked.camera.id])
         accuracy = Tracked(tracked.sigma.rotation_deg, tracked.sigma.position_m, pose.clock, pose.arrived_ns)
-        self.sender.send([shot], pose.at_ns, pose.rate, tracked.how, accuracy)
-        self.sent(SentPose(shot.posed, tracked.how, pose.number, pose.at_ns, accuracy))
+        self.sender.send([camera], pose.at_ns, pose.rate, tracked.how, accuracy)
+        self.sent(SentPose(camera.posed, tracked.how, pose.number, pose.at_ns, accuracy))

@@ -4,38 +4,35 @@ Camera and lens are OpenCV's (`fisheye`: `cv2.fisheye`); rotation, a Rodrigues v
 translation take the world to the camera. Cameras have numbers and no names; the world is that of the board, in metres.
 """
 
-import json
 from collections.abc import Sequence
 from typing import Any
 
 from service.formats.lens import COEFFICIENTS, NumberedCamera
 from service.formats.parsing import ParsedFile
-from service.formats.pose2sim import NO_DISTORTION, read_table
+from service.formats.pose2sim import read_table, write_tables
 from service.formats.records import CameraRecord
 
 
-def write(shots: Sequence[NumberedCamera]) -> bytes:
+def write(cameras: Sequence[NumberedCamera]) -> bytes:
     """Return a table for each camera, numbered from 1 in the order of the venue."""
-    return "\n".join(line for shot in shots for line in [*_table(shot), ""]).encode()
+    return write_tables({f"cameras.{camera.number}": _members(camera) for camera in cameras})
 
 
-def _table(shot: NumberedCamera) -> list[str]:
-    if not shot.is_fisheye:
-        shot.require_support("caliscope", COEFFICIENTS)
-    intrinsics = shot.camera.intrinsics
+def _members(camera: NumberedCamera) -> dict[str, Any]:
+    if not camera.is_fisheye:
+        camera.require_support("caliscope", COEFFICIENTS)
     members: dict[str, Any] = {
-        "cam_id": shot.number,
-        "size": list(shot.size),
+        "cam_id": camera.number,
+        "size": list(camera.size),
         "rotation_count": 0,
         "ignore": False,
-        "fisheye": shot.is_fisheye,
-        "matrix": [[float(value) for value in row] for row in intrinsics.matrix],
-        "distortions": shot.fisheye_coefficients if shot.is_fisheye else intrinsics.distortion or NO_DISTORTION,
+        "fisheye": camera.is_fisheye,
+        "matrix": [[float(value) for value in row] for row in camera.intrinsics.matrix],
+        "distortions": camera.distortion,
     }
-    if shot.has_pose:
-        members |= {"rotation": shot.pose.rotation, "translation": shot.pose.translation}
-    # Numbers, booleans and arrays of them are the same in TOML as in JSON.
-    return [f"[cameras.{shot.number}]", *(f"{name} = {json.dumps(value)}" for name, value in members.items())]
+    if camera.has_pose:
+        members |= {"rotation": camera.pose.rotation, "translation": camera.pose.translation}
+    return members
 
 
 def recognises(file: ParsedFile) -> bool:

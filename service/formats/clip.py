@@ -33,7 +33,7 @@ class TrackedCamera:
     motion since the first frame: of the rotation in degrees, of the position in metres.
     """
 
-    shot: NumberedCamera
+    camera: NumberedCamera
     status: str
     sigma: tuple[float, float]
     motion_sigma: tuple[float, float]
@@ -47,11 +47,11 @@ class ClipPoses:
     it, before there are any files.
     """
 
-    def __init__(self, stem: Path, shots: Sequence[NumberedCamera], freed_axes: str) -> None:
-        """`shots`: the cameras as they are stored."""
-        for shot in shots:
-            opentrackio.write(shot)
-        freed.write(shots, freed_axes)
+    def __init__(self, stem: Path, cameras: Sequence[NumberedCamera], freed_axes: str) -> None:
+        """`cameras`: the cameras as they are stored."""
+        for camera in cameras:
+            opentrackio.write(camera)
+        freed.write(cameras, freed_axes)
         self._axes = freed_axes
         self._angles = opentrackio.SteadyAngles()
         self._number = 0
@@ -68,15 +68,15 @@ class ClipPoses:
         """Write the next frame of a clip at `rate` frames a second, its cameras in the order of the venue."""
         for camera in cameras:
             frame = opentrackio.Frame(self._number, rate, camera.status)
-            self._samples.write(opentrackio.write_frame(camera.shot, frame, self._angles))
+            self._samples.write(opentrackio.write_frame(camera.camera, frame, self._angles))
             self._rows.writerow(self._row(camera))
-        self._packets.write(freed.write([camera.shot for camera in cameras], self._axes))
+        self._packets.write(freed.write([camera.camera for camera in cameras], self._axes))
         self._number += 1
 
     def _row(self, camera: TrackedCamera) -> list[str | int]:
-        pose = camera.shot.pose
+        pose = camera.camera.pose
         numbers = (*pose.rotation, *pose.position, *camera.sigma, *camera.motion_sigma)
-        return [self._number, camera.shot.id, camera.status, *(f"{value:.8g}" for value in numbers)]
+        return [self._number, camera.camera.id, camera.status, *(f"{value:.8g}" for value in numbers)]
 
     def __enter__(self) -> Self:
         return self

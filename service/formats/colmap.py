@@ -44,42 +44,42 @@ COEFFICIENT_ORDER = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
 POINT2D_BYTES = 24
 
 
-def write(shots: Sequence[NumberedCamera]) -> bytes:
+def write(cameras: Sequence[NumberedCamera]) -> bytes:
     """Return a zip of the three files. Images are named as their cameras, with `.jpg`: the frames to put beside them.
 
     Ids follow the names, as those of `feature_extractor` do: `point_triangulator` takes no model whose ids differ from
     those of its database.
     """
-    numbered = list(enumerate(sorted(shots, key=_name), start=1))
-    cameras = ["# CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]", *(_camera(number, shot) for number, shot in numbered)]
+    numbered = list(enumerate(sorted(cameras, key=_name), start=1))
+    lenses = ["# CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]", *(_camera(number, camera) for number, camera in numbered)]
     images = ["# IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME; then a line of POINTS2D[]"]
-    for number, shot in numbered:
-        images += [_image(number, shot), ""]
+    for number, camera in numbered:
+        images += [_image(number, camera), ""]
     points = ["# POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[]"]
-    files = {"cameras.txt": cameras, "images.txt": images, "points3D.txt": points}
+    files = {"cameras.txt": lenses, "images.txt": images, "points3D.txt": points}
     return archive({name: "\n".join([*lines, ""]).encode() for name, lines in files.items()})
 
 
-def _name(shot: NumberedCamera) -> str:
+def _name(camera: NumberedCamera) -> str:
     """Return the name of the file of a camera's frame."""
-    return f"{shot.id}.jpg"
+    return f"{camera.id}.jpg"
 
 
-def _camera(number: int, shot: NumberedCamera) -> str:
-    if shot.is_fisheye:
-        model, coefficients = "OPENCV_FISHEYE", shot.fisheye_coefficients
+def _camera(number: int, camera: NumberedCamera) -> str:
+    if camera.is_fisheye:
+        model, coefficients = "OPENCV_FISHEYE", camera.distortion
     else:
-        shot.require_support("colmap", {*RADIAL, *TANGENTIAL})
-        needs_all = any(shot.coefficients[name] for name in ("k3", "k4", "k5", "k6"))
+        camera.require_support("colmap", {*RADIAL, *TANGENTIAL})
+        needs_all = any(camera.coefficients[name] for name in ("k3", "k4", "k5", "k6"))
         model = "FULL_OPENCV" if needs_all else "OPENCV"
-        coefficients = [shot.coefficients[name] for name in COEFFICIENT_ORDER[: 8 if needs_all else 4]]
-    centre = [value + 0.5 for value in shot.principal]
-    return _line(number, model, *shot.size, *map(float, [*shot.focal, *centre, *coefficients]))
+        coefficients = [camera.coefficients[name] for name in COEFFICIENT_ORDER[: 8 if needs_all else 4]]
+    centre = [value + 0.5 for value in camera.principal]
+    return _line(number, model, *camera.size, *map(float, [*camera.focal, *centre, *coefficients]))
 
 
-def _image(number: int, shot: NumberedCamera) -> str:
-    pose = shot.pose
-    return _line(number, *quaternion(pose.rotation), *pose.translation, number, _name(shot))
+def _image(number: int, camera: NumberedCamera) -> str:
+    pose = camera.pose
+    return _line(number, *quaternion(pose.rotation), *pose.translation, number, _name(camera))
 
 
 def _line(*words: str | float) -> str:
@@ -120,7 +120,7 @@ def _posed(
     lenses: dict[int, tuple[Intrinsics, tuple[int, int]]],
 ) -> CameraRecord:
     if camera not in lenses:
-        raise FileRefusedError(node.file, node.place, "a camera of cameras.txt or cameras.bin", f"camera {camera}")
+        node.refuse("a camera of cameras.txt or cameras.bin", f"camera {camera}")
     lens, size = lenses[camera]
     if not any(numbers[:4]):
         node.refuse("a quaternion that is not 0")
@@ -132,11 +132,9 @@ def _lens(node: Node, model: str, parameters: Sequence[float], size: tuple[int, 
     names = MODELS[model][1] if model in MODELS else None
     if names is None:
         known = ", ".join(name for name, (_, parts) in MODELS.items() if parts)
-        raise FileRefusedError(node.file, node.place, f"a model that OpenCV has too ({known})", model)
+        node.refuse(f"a model that OpenCV has too ({known})", model)
     if len(parameters) != len(names):
-        raise FileRefusedError(
-            node.file, node.place, f"{len(names)} parameters of {model} ({', '.join(names)})", f"{len(parameters)}"
-        )
+        node.refuse(f"{len(names)} parameters of {model} ({', '.join(names)})", f"{len(parameters)}")
     k = dict(zip(names, parameters, strict=True))
     fx, fy = k.get("fx", k.get("f", 0.0)), k.get("fy", k.get("f", 0.0))
     principal = k["cx"] - 0.5, k["cy"] - 0.5
@@ -207,7 +205,7 @@ def _number(node: Node, word: str) -> float:
     try:
         return Node(node.file, node.place, float(word)).number()
     except ValueError:
-        raise FileRefusedError(node.file, node.place, "finite numbers", word) from None
+        node.refuse("finite numbers", word)
 
 
 def _ends_well(parse: Callable[[ParsedFile], Iterator[object]], file: ParsedFile) -> bool:

@@ -8,12 +8,11 @@ nearly.
 import math
 from collections.abc import Callable
 from itertools import product
-from typing import NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
-from service.formats.nodes import FileRefusedError, Node
+from service.formats.nodes import Node
 from service.formats.records import camera_matrix, lens_of
 from service.schemas.geometry import Intrinsics
 from service.schemas.lens_map import WIDEST_FISHEYE
@@ -59,20 +58,16 @@ def fit_fisheye(
         angles = angle_of(distances)
         grows = bool((np.diff(angles) > 0).all())
     if not grows:
-        _refuse(node, "a lens whose rays go farther aside up to the corners of its picture", "one that folds")
+        node.refuse("a lens whose rays go farther aside up to the corners of its picture", "one that folds")
     widest = math.atan(WIDEST_FISHEYE)
     if angles[-1] >= widest:
         seen, most = (f"{math.degrees(angle):.0f} degrees" for angle in (angles[-1], widest))
-        _refuse(node, f"a lens that sees less than {most} off its axis in the corners of its picture", seen)
+        node.refuse(f"a lens that sees less than {most} off its axis in the corners of its picture", seen)
     terms = angles[:, None] ** [1, 3, 5, 7, 9]
     (scale, *others), *_ = np.linalg.lstsq(terms, distances, rcond=None)
     error_px = max(focal) * float(np.abs(terms @ [scale, *others] - distances).max())
     if error_px > LARGEST_ERROR_PX:
-        _refuse(node, f"a lens that a fisheye follows to {LARGEST_ERROR_PX:g} px", f"one to {error_px:.2g} px")
+        node.refuse(f"a lens that a fisheye follows to {LARGEST_ERROR_PX:g} px", f"one to {error_px:.2g} px")
     fx, fy = (float(scale * length) for length in focal)
     matrix = camera_matrix(fx, fy, *principal)
     return lens_of(node, matrix, [float(term / scale) for term in others], "fisheye")
-
-
-def _refuse(node: Node, expected: str, got: str) -> NoReturn:
-    raise FileRefusedError(node.file, node.place, expected, got)

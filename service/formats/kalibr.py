@@ -13,6 +13,7 @@ from service.formats.parsing import ParsedFile
 from service.formats.records import CameraRecord, camera_matrix, lens_of
 from service.formats.rotations import (
     Matrix,
+    pose_from_matrix,
     pose_from_translation,
     product,
     rotation_of,
@@ -27,32 +28,32 @@ from service.schemas.problems import Problem
 MODELS: dict[str, LensModel] = {"radtan": "opencv", "equidistant": "fisheye", "equi": "fisheye", "none": "opencv"}
 
 
-def write(shots: Sequence[NumberedCamera]) -> bytes:
+def write(cameras: Sequence[NumberedCamera]) -> bytes:
     """Return a chain of the cameras in their order. Cameras without poses get no transform."""
     lines: list[str] = []
-    for number, shot in enumerate(shots):
-        before = shots[number - 1] if number and shot.has_pose and shots[number - 1].has_pose else None
-        lines += [f"cam{number}:", *(f"  {line}" for line in _camera(shot, before))]
+    for number, camera in enumerate(cameras):
+        before = cameras[number - 1] if number and camera.has_pose and cameras[number - 1].has_pose else None
+        lines += [f"cam{number}:", *(f"  {line}" for line in _camera(camera, before))]
     return "\n".join([*lines, ""]).encode()
 
 
-def _camera(shot: NumberedCamera, before: NumberedCamera | None) -> list[str]:
-    if not shot.is_fisheye:
-        shot.require_support("kalibr", ("k1", "k2", "p1", "p2"))
-    elif shot.camera.intrinsics.matrix[0][1]:
-        raise Problem("format-cannot-hold", f"kalibr has no place for skew of the lens of camera {shot.id}.")
-    k = shot.coefficients
-    coefficients = shot.fisheye_coefficients if shot.is_fisheye else [k[name] for name in ("k1", "k2", "p1", "p2")]
-    lines = [] if before is None else ["T_cn_cnm1:", *(f"- {_row(row)}" for row in _transform(before, shot))]
+def _camera(camera: NumberedCamera, before: NumberedCamera | None) -> list[str]:
+    if not camera.is_fisheye:
+        camera.require_support("kalibr", ("k1", "k2", "p1", "p2"))
+    elif camera.intrinsics.matrix[0][1]:
+        raise Problem("format-cannot-hold", f"kalibr has no place for skew of the lens of camera {camera.id}.")
+    k = camera.coefficients
+    coefficients = camera.distortion if camera.is_fisheye else [k[name] for name in ("k1", "k2", "p1", "p2")]
+    lines = [] if before is None else ["T_cn_cnm1:", *(f"- {_row(row)}" for row in _transform(before, camera))]
     return [
         *lines,
         "cam_overlaps: []",
         "camera_model: pinhole",
         f"distortion_coeffs: {_row(coefficients)}",
-        f"distortion_model: {'equidistant' if shot.is_fisheye else 'radtan'}",
-        f"intrinsics: {_row([*shot.focal, *shot.principal])}",
-        f"resolution: [{shot.size[0]}, {shot.size[1]}]",
-        f"rostopic: /{shot.id}/image_raw",
+        f"distortion_model: {'equidistant' if camera.is_fisheye else 'radtan'}",
+        f"intrinsics: {_row([*camera.focal, *camera.principal])}",
+        f"resolution: [{camera.size[0]}, {camera.size[1]}]",
+        f"rostopic: /{camera.id}/image_raw",
     ]
 
 
@@ -60,10 +61,10 @@ def _row(numbers: Sequence[float]) -> str:
     return f"[{', '.join(repr(float(number)) for number in numbers)}]"
 
 
-def _transform(before: NumberedCamera, shot: NumberedCamera) -> Matrix:
-    turn = product(shot.rotation, transposed(before.rotation))
+def _transform(before: NumberedCamera, camera: NumberedCamera) -> Matrix:
+    turn = product(camera.rotation, transposed(before.rotation))
     turned = product(turn, [[part] for part in before.pose.translation])
-    moved = [part - by for part, (by,) in zip(shot.pose.translation, turned, strict=True)]
+    moved = [part - by for part, (by,) in zip(camera.pose.translation, turned, strict=True)]
     return [*([*row, part] for row, part in zip(turn, moved, strict=True)), [0.0, 0.0, 0.0, 1.0]]
 
 
@@ -78,7 +79,7 @@ def read(file: ParsedFile) -> list[CameraRecord]:
     """Return the cameras of a chain."""
     cameras = [(name, camera) for name, camera in file.top.members() if "camera_model" in camera]
     by_imu = all("T_cam_imu" in camera for _, camera in cameras)
-    poses = [_pose(camera["T_cam_imu"]) for _, camera in cameras] if by_imu else _chained(cameras)
+    poses = [pose_from_matrix(camera["T_cam_imu"]) for _, camera in cameras] if by_imu else _chained(cameras)
     return [
         CameraRecord(_name(name, camera), *_lens(camera), pose)
         for (name, camera), pose in zip(cameras, poses, strict=True)
@@ -99,14 +100,8 @@ def _lens(camera: Node) -> tuple[Intrinsics, tuple[int, int]]:
     if model.value not in MODELS:
         model.refuse(f"one of {', '.join(MODELS)}")
     coefficients = [] if model.value == "none" else camera["distortion_coeffs"].numbers(4)
-    width, height = (side.integer(1) for side in camera["resolution"].elements(2))
     lens = lens_of(camera, camera_matrix(*camera["intrinsics"].numbers(4)), coefficients, MODELS[model.value])
-    return lens, (width, height)
-
-
-def _pose(node: Node) -> Pose:
-    rotation, translation = split_matrix(node)
-    return pose_from_translation(rotation_of(node, rotation), translation)
+    return lens, camera["resolution"].size()
 
 
 def _chained(cameras: Sequence[tuple[str, Node]]) -> list[Pose | None]:

@@ -6,13 +6,18 @@ from dataclasses import dataclass
 from service.formats.rotations import Matrix, matrix_of
 from service.schemas.encoders import LensEncoders
 from service.schemas.geometry import COEFFICIENTS as COEFFICIENTS_BY_MODEL
-from service.schemas.geometry import Pose, PosedCamera, UnposedCamera
+from service.schemas.geometry import Intrinsics, Pose, PosedCamera, UnposedCamera
 from service.schemas.problems import Problem
 
 COEFFICIENTS = COEFFICIENTS_BY_MODEL["opencv"]
 RADIAL = ("k1", "k2", "k3", "k4", "k5", "k6")
 TANGENTIAL = ("p1", "p2")
 THIN_PRISM = ("s1", "s2", "s3", "s4")
+
+
+def cannot_hold(camera: str, lacks: str, got: list[str] | float) -> Problem:
+    """Return the problem of a format that has no place for something of a camera."""
+    return Problem("format-cannot-hold", lacks, camera=camera, got=got)
 
 
 @dataclass(frozen=True)
@@ -32,15 +37,16 @@ class NumberedCamera:
         return self.camera.id
 
     @property
+    def intrinsics(self) -> Intrinsics:
+        """Lens of the camera."""
+        return self.camera.intrinsics
+
+    @property
     def posed(self) -> PosedCamera:
         """The camera; refuses one without a pose, which most formats have no way to say."""
         if not isinstance(self.camera, PosedCamera):
-            raise Problem(
-                "format-cannot-hold",
-                f"camera {self.id} has no pose; opencv, ros, kalibr, caliscope and json hold lenses alone.",
-                camera=self.id,
-                got=["no pose"],
-            )
+            lacks = f"camera {self.id} has no pose; opencv, ros, kalibr, caliscope and json hold lenses alone."
+            raise cannot_hold(self.id, lacks, ["no pose"])
         return self.camera
 
     @property
@@ -56,23 +62,23 @@ class NumberedCamera:
     @property
     def is_fisheye(self) -> bool:
         """True for OpenCV's fisheye lens (Kannala-Brandt)."""
-        return self.camera.intrinsics.model == "fisheye"
+        return self.intrinsics.model == "fisheye"
 
     @property
-    def fisheye_coefficients(self) -> list[float]:
-        """Coefficients k1 to k4 of a fisheye lens."""
-        return [*(self.camera.intrinsics.distortion or [0.0] * 4)]
+    def distortion(self) -> list[float]:
+        """Coefficients in OpenCV's order, of a fisheye k1 to k4; zeros in place of none, which OpenCV does not take."""
+        return [float(value) for value in self.intrinsics.distortion or [0.0] * (4 if self.is_fisheye else 5)]
 
     @property
     def focal(self) -> tuple[float, float]:
         """Focal lengths fx, fy in pixels."""
-        (fx, _, _), (_, fy, _), _ = self.camera.intrinsics.matrix
+        (fx, _, _), (_, fy, _), _ = self.intrinsics.matrix
         return fx, fy
 
     @property
     def principal(self) -> tuple[float, float]:
         """Principal point cx, cy in pixels, pixel centres at integers."""
-        (_, _, cx), (_, _, cy), _ = self.camera.intrinsics.matrix
+        (_, _, cx), (_, _, cy), _ = self.intrinsics.matrix
         return cx, cy
 
     @property
@@ -84,7 +90,7 @@ class NumberedCamera:
     @property
     def coefficients(self) -> dict[str, float]:
         """Distortion coefficients by their names in `COEFFICIENTS`, absent ones zero."""
-        given = self.camera.intrinsics.distortion
+        given = self.intrinsics.distortion
         return dict(zip(COEFFICIENTS, [*given, *[0.0] * (len(COEFFICIENTS) - len(given))], strict=True))
 
     @property
@@ -94,23 +100,14 @@ class NumberedCamera:
 
     def require_support(self, name: str, supported: Collection[str]) -> None:
         """Refuse a lens with skew or coefficients that are not `supported`: without them points are pixels off."""
-        model = self.camera.intrinsics.model
+        model = self.intrinsics.model
         if model != "opencv":
             kind = "fisheye lens" if self.is_fisheye else f"{model} panorama"
-            raise Problem(
-                "format-cannot-hold",
-                f"{name} has no place for the {kind} of camera {self.id}; json and st-map hold every lens.",
-                camera=self.id,
-                got=[model],
-            )
+            lacks = f"{name} has no place for the {kind} of camera {self.id}; json and st-map hold every lens."
+            raise cannot_hold(self.id, lacks, [model])
         beyond = [key for key, value in self.coefficients.items() if value != 0 and key not in supported]
-        if self.camera.intrinsics.matrix[0][1] != 0:
+        if self.intrinsics.matrix[0][1] != 0:
             beyond.append("skew")
         if beyond:
-            raise Problem(
-                "format-cannot-hold",
-                f"{name} has no place for {', '.join(beyond)} of the lens of camera {self.id}; "
-                "json and st-map hold every lens.",
-                camera=self.id,
-                got=beyond,
-            )
+            parts = f"{', '.join(beyond)} of the lens of camera {self.id}"
+            raise cannot_hold(self.id, f"{name} has no place for {parts}; json and st-map hold every lens.", beyond)

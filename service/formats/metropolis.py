@@ -19,12 +19,11 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from service.formats.lens import COEFFICIENTS, NumberedCamera
+from service.formats.lens import COEFFICIENTS, NumberedCamera, cannot_hold
 from service.formats.nodes import Node
 from service.formats.parsing import ParsedFile
 from service.formats.records import CameraRecord, lens_of
 from service.formats.rotations import pose_from_matrix, product, transposed
-from service.schemas.problems import Problem
 
 # Pixels and the ground behind them are told at so many columns and rows of the picture, where the ground is no farther
 # off: next to the horizon a pixel is many metres.
@@ -36,31 +35,29 @@ LEAST_POINTS = 4
 NOWHERE = {"lat": 0.0, "lng": 0.0}
 
 
-def write(shots: Sequence[NumberedCamera]) -> bytes:
+def write(cameras: Sequence[NumberedCamera]) -> bytes:
     """Return all cameras in one object. Raises `Problem` for a fisheye, a skew and a camera that sees no ground."""
-    sensors = [_sensor(shot) for shot in shots]
+    sensors = [_sensor(camera) for camera in cameras]
     document = {"version": "1.0", "osmURL": "", "calibrationType": "cartesian", "sensors": sensors}
     return (json.dumps(document, indent=2) + "\n").encode()
 
 
-def _sensor(shot: NumberedCamera) -> dict[str, Any]:
+def _sensor(camera: NumberedCamera) -> dict[str, Any]:
     # Coefficients are not held, but taken off the picture before.
-    shot.require_support("metropolis", COEFFICIENTS)
-    pose = shot.pose
-    intrinsic = [[float(value) for value in row] for row in shot.camera.intrinsics.matrix]
-    extrinsic = [[*row, moved] for row, moved in zip(shot.rotation, pose.translation, strict=True)]
-    pairs = list(_ground_points(shot))
+    camera.require_support("metropolis", COEFFICIENTS)
+    pose = camera.pose
+    intrinsic = [[float(value) for value in row] for row in camera.intrinsics.matrix]
+    extrinsic = [[*row, moved] for row, moved in zip(camera.rotation, pose.translation, strict=True)]
+    pairs = list(_ground_points(camera))
     if len(pairs) < LEAST_POINTS:
-        raise Problem(
-            "format-cannot-hold",
+        lacks = (
             f"metropolis wants {LEAST_POINTS} pixels with the ground behind them, within {FARTHEST_M:g} m, and camera "
-            f"{shot.id} has {len(pairs)}.",
-            camera=shot.id,
-            got=["no ground in view"],
+            f"{camera.id} has {len(pairs)}."
         )
+        raise cannot_hold(camera.id, lacks, ["no ground in view"])
     return {
         "type": "camera",
-        "id": shot.id,
+        "id": camera.id,
         "origin": NOWHERE,
         "geoLocation": NOWHERE,
         "coordinates": dict(zip("xyz", map(float, pose.position), strict=True)),
@@ -70,7 +67,7 @@ def _sensor(shot: NumberedCamera) -> dict[str, Any]:
         "translationToGlobalCoordinates": {"x": 0.0, "y": 0.0},
         "attributes": [
             {"name": name, "value": str(pixels)}
-            for name, pixels in zip(("frameWidth", "frameHeight"), shot.size, strict=True)
+            for name, pixels in zip(("frameWidth", "frameHeight"), camera.size, strict=True)
         ],
         "place": [{"name": "building", "value": "field"}],
         "imageCoordinates": [{"x": column, "y": row} for (column, row), _ in pairs],
@@ -81,22 +78,22 @@ def _sensor(shot: NumberedCamera) -> dict[str, Any]:
     }
 
 
-def _ground_points(shot: NumberedCamera) -> Iterator[tuple[tuple[int, int], tuple[float, float]]]:
+def _ground_points(camera: NumberedCamera) -> Iterator[tuple[tuple[int, int], tuple[float, float]]]:
     """Return pixels (column, row) of the undistorted picture, and x, y of the ground (z = 0) that they show."""
-    width, height = shot.size
+    width, height = camera.size
     for row in (round(height * (number + 0.5) / ROWS) for number in range(ROWS)):
         for column in (round(width * (number + 0.5) / COLUMNS) for number in range(COLUMNS)):
-            ground = _ground_behind(shot, column, row)
+            ground = _ground_behind(camera, column, row)
             if ground is not None:
                 yield (column, row), ground
 
 
-def _ground_behind(shot: NumberedCamera, column: int, row: int) -> tuple[float, float] | None:
+def _ground_behind(camera: NumberedCamera, column: int, row: int) -> tuple[float, float] | None:
     """Return x, y of the ground (z = 0) that a pixel of the undistorted picture shows; None: sky, or far off."""
-    (fx, fy), (cx, cy) = shot.focal, shot.principal
+    (fx, fy), (cx, cy) = camera.focal, camera.principal
     in_camera = [[(column - cx) / fx], [(row - cy) / fy], [1.0]]
-    (right,), (ahead,), (up,) = product(transposed(shot.rotation), in_camera)
-    x, y, height = shot.pose.position
+    (right,), (ahead,), (up,) = product(transposed(camera.rotation), in_camera)
+    x, y, height = camera.pose.position
     if up == 0 or height / -up <= 0:
         return None
     distance = height / -up

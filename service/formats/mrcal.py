@@ -13,16 +13,16 @@ from service.formats.rotations import pose_from_translation
 LENGTHS = {"LENSMODEL_PINHOLE": 0, **{f"LENSMODEL_OPENCV{length}": length for length in (4, 5, 8, 12)}}
 
 
-def write(shot: NumberedCamera) -> bytes:
+def write(camera: NumberedCamera) -> bytes:
     """Return the model of a camera, with as few coefficients as its lens needs."""
-    shot.require_support("mrcal", COEFFICIENTS[: max(LENGTHS.values())])
-    used = max((n for n, value in enumerate(shot.coefficients.values(), start=1) if value), default=0)
+    camera.require_support("mrcal", COEFFICIENTS[: max(LENGTHS.values())])
+    used = max((n for n, value in enumerate(camera.coefficients.values(), start=1) if value), default=0)
     model, length = next(one for one in LENGTHS.items() if one[1] >= used)
     members = {
         "lensmodel": model,
-        "intrinsics": [*shot.focal, *shot.principal, *[*shot.coefficients.values()][:length]],
-        "extrinsics": [*shot.pose.rotation, *shot.pose.translation],
-        "imagersize": [*shot.size],
+        "intrinsics": [*camera.focal, *camera.principal, *[*camera.coefficients.values()][:length]],
+        "extrinsics": [*camera.pose.rotation, *camera.pose.translation],
+        "imagersize": [*camera.size],
     }
     lines = [f"    {name!r}: {value!r}," for name, value in members.items()]
     return "\n".join(["{", *lines, "}", ""]).encode()
@@ -41,7 +41,6 @@ def read(file: ParsedFile) -> list[CameraRecord]:
     fx, fy, cx, cy, *coefficients = top["intrinsics"].numbers(4 + LENGTHS[model.value])
     extrinsics = top["rt_cam_ref"] if "rt_cam_ref" in top else top["extrinsics"]
     numbers = extrinsics.numbers(6)
-    width, height = (side.integer(1) for side in top["imagersize"].elements(2))
     pose = pose_from_translation(numbers[:3], numbers[3:])
     lens = lens_of(top["intrinsics"], camera_matrix(fx, fy, cx, cy), coefficients)
-    return [CameraRecord(stem_of(file.name), lens, (width, height), pose)]
+    return [CameraRecord(stem_of(file.name), lens, top["imagersize"].size(), pose)]

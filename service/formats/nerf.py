@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from service.formats.lens import NumberedCamera
-from service.formats.nodes import FileRefusedError, Node
+from service.formats.nodes import Node
 from service.formats.parsing import ParsedFile
 from service.formats.records import CameraRecord, camera_matrix, lens_of, stem_of
 from service.formats.rotations import Matrix, rotation_of, split_matrix, transposed, vector_of
@@ -24,9 +24,9 @@ OF_A_FRAME = ("file_path", "transform_matrix")
 BROWN_MODELS = ("OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "PERSPECTIVE")
 
 
-def write(shots: Sequence[NumberedCamera]) -> bytes:
+def write(cameras: Sequence[NumberedCamera]) -> bytes:
     """Return all cameras; pictures are named as their cameras, with `.jpg`."""
-    frames = [_frame(shot) for shot in shots]
+    frames = [_frame(camera) for camera in cameras]
     shared = {
         key: value
         for key, value in frames[0].items()
@@ -36,20 +36,20 @@ def write(shots: Sequence[NumberedCamera]) -> bytes:
     return (json.dumps({**shared, "frames": frames}, indent=2) + "\n").encode()
 
 
-def _frame(shot: NumberedCamera) -> dict[str, Any]:
-    if shot.is_fisheye:
-        k = dict(zip(FISHEYE, shot.fisheye_coefficients, strict=True))
+def _frame(camera: NumberedCamera) -> dict[str, Any]:
+    if camera.is_fisheye:
+        k = dict(zip(FISHEYE, camera.distortion, strict=True))
     else:
-        shot.require_support("nerf", SUPPORTED)
-        k = {name: shot.coefficients[name] for name in SUPPORTED}
-    (fx, fy), (cx, cy), (width, height) = shot.focal, shot.principal, shot.size
-    rows = [[*row, part] for row, part in zip(_turned(transposed(shot.rotation)), shot.pose.position, strict=True)]
+        camera.require_support("nerf", SUPPORTED)
+        k = {name: camera.coefficients[name] for name in SUPPORTED}
+    (fx, fy), (cx, cy), (width, height) = camera.focal, camera.principal, camera.size
+    rows = [[*row, part] for row, part in zip(_turned(transposed(camera.rotation)), camera.pose.position, strict=True)]
     return {
-        "camera_model": "OPENCV_FISHEYE" if shot.is_fisheye else "OPENCV",
-        **({"is_fisheye": True} if shot.is_fisheye else {}),
+        "camera_model": "OPENCV_FISHEYE" if camera.is_fisheye else "OPENCV",
+        **({"is_fisheye": True} if camera.is_fisheye else {}),
         **{"w": width, "h": height, "fl_x": fx, "fl_y": fy, "cx": cx + 0.5, "cy": cy + 0.5},
         **k,
-        "file_path": f"{shot.id}.jpg",
+        "file_path": f"{camera.id}.jpg",
         "transform_matrix": [*rows, [0.0, 0.0, 0.0, 1.0]],
     }
 
@@ -96,12 +96,12 @@ def _lens(top: Node, frame: Node) -> tuple[Intrinsics, tuple[int, int] | None]:
     size = None if width is None or height is None else (width.integer(1), height.integer(1))
     angle = number("camera_angle_x")
     if not 0 <= angle < math.pi:
-        raise FileRefusedError(frame.file, frame.place, "a camera_angle_x of less than half a turn", f"{angle:g}")
+        frame.refuse("a camera_angle_x of less than half a turn", f"{angle:g}")
     if member("fl_x") is None and not (angle and size):
-        raise FileRefusedError(frame.file, frame.place, "fl_x, or camera_angle_x with w and h", "neither")
+        frame.refuse("fl_x, or camera_angle_x with w and h", "neither")
     fx = number("fl_x") if size is None or not angle else number("fl_x", size[0] / 2 / math.tan(angle / 2))
     if size is None and (member("cx") is None or member("cy") is None):
-        raise FileRefusedError(frame.file, frame.place, "cx and cy, or w and h", "neither")
+        frame.refuse("cx and cy, or w and h", "neither")
     cx, cy = (number(name, side / 2) - 0.5 for name, side in zip(("cx", "cy"), size or (0, 0), strict=True))
     matrix = camera_matrix(fx, number("fl_y", fx), cx, cy)
     model, flagged = member("camera_model"), member("is_fisheye")

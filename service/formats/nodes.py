@@ -25,9 +25,9 @@ class Node:
     place: str
     value: Any
 
-    def refuse(self, expected: str) -> NoReturn:
-        """Raise `FileRefusedError` for this value."""
-        raise FileRefusedError(self.file, self.place, expected, _shown(self.value))
+    def refuse(self, expected: str, got: str | None = None) -> NoReturn:
+        """Raise `FileRefusedError` for this value, or for what `got` names of it."""
+        raise FileRefusedError(self.file, self.place, expected, _shown(self.value) if got is None else got)
 
     def __contains__(self, key: str) -> bool:
         return isinstance(self.value, dict) and self.value.get(key) is not None
@@ -37,7 +37,7 @@ class Node:
         if not isinstance(self.value, dict):
             self.refuse(f"a mapping with {key}")
         if self.value.get(key) is None:
-            raise FileRefusedError(self.file, self.place, f"a member {key}", _shown(list(self.value)))
+            self.refuse(f"a member {key}", _shown(list(self.value)))
         return self._below(key)
 
     def get(self, key: str) -> "Node | None":
@@ -72,6 +72,11 @@ class Node:
         if self.value not in (True, False):
             self.refuse("true or false")
         return bool(self.value)
+
+    def size(self) -> tuple[int, int]:
+        """Return the width and height of a picture."""
+        width, height = (side.integer(1) for side in self.elements(2))
+        return width, height
 
     def number(self) -> float:
         """Return a finite number."""

@@ -14,8 +14,6 @@ from service.formats.parsing import ParsedFile
 from service.formats.records import CameraRecord, lens_of, stem_of
 from service.formats.rotations import pose_from_translation, read_rotation
 
-# FileStorage has no empty matrices; five zeros are what OpenCV itself takes for no distortion.
-NO_DISTORTION = [0.0] * 5
 MATRIX_NAMES = ("camera_matrix", "cameraMatrix", "Camera_Matrix", "intrinsic_matrix", "K")
 DISTORTION_NAMES = (
     "distortion_coefficients",
@@ -29,26 +27,24 @@ ROTATION_NAMES, TRANSLATION_NAMES = ("rvec", "rotation", "R"), ("tvec", "transla
 WIDTH_NAMES, HEIGHT_NAMES = ("image_width", "image_Width"), ("image_height", "image_Height")
 
 
-def write(shot: NumberedCamera) -> bytes:
+def write(camera: NumberedCamera) -> bytes:
     """Return image size, camera matrix, distortion in OpenCV's order, rvec and tvec (world to camera, m)."""
-    if not shot.is_fisheye:
+    if not camera.is_fisheye:
         # Its matrix could hold a skew, but `cv2.projectPoints` does not read it.
-        shot.require_support("opencv", COEFFICIENTS)
-    intrinsics = shot.camera.intrinsics
-    width, height = shot.size
-    distortion = shot.fisheye_coefficients if shot.is_fisheye else intrinsics.distortion or NO_DISTORTION
+        camera.require_support("opencv", COEFFICIENTS)
+    width, height = camera.size
     lines = [
         "%YAML:1.0",
         "---",
         f"image_width: {width}",
         f"image_height: {height}",
-        *_matrix("camera_matrix", intrinsics.matrix),
-        *(["fisheye_model: 1"] if shot.is_fisheye else []),
-        *_matrix("distortion_coefficients", [distortion]),
+        *_matrix("camera_matrix", camera.intrinsics.matrix),
+        *(["fisheye_model: 1"] if camera.is_fisheye else []),
+        *_matrix("distortion_coefficients", [camera.distortion]),
     ]
-    if shot.has_pose:
-        lines += _matrix("rvec", [[value] for value in shot.pose.rotation])
-        lines += _matrix("tvec", [[value] for value in shot.pose.translation])
+    if camera.has_pose:
+        lines += _matrix("rvec", [[value] for value in camera.pose.rotation])
+        lines += _matrix("tvec", [[value] for value in camera.pose.translation])
     return "\n".join([*lines, ""]).encode()
 
 

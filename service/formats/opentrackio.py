@@ -71,53 +71,47 @@ class SteadyAngles:
 
     _last: dict[str, tuple[float, float, float]] = field(default_factory=dict)
 
-    def of(self, shot: NumberedCamera) -> tuple[float, float, float]:
+    def of(self, camera: NumberedCamera) -> tuple[float, float, float]:
         """Return the angles of the next sample of a camera, each as near to those of the one before as turns allow."""
-        angles = _pan_tilt_roll_deg(shot)
-        last = self._last.get(shot.id, angles)
+        angles = _pan_tilt_roll_deg(camera)
+        last = self._last.get(camera.id, angles)
         pan, tilt, roll = (
             angle + 360 * round((before - angle) / 360) for angle, before in zip(angles, last, strict=True)
         )
-        self._last[shot.id] = pan, tilt, roll
+        self._last[camera.id] = pan, tilt, roll
         return pan, tilt, roll
 
 
-def write(shot: NumberedCamera) -> bytes:
+def write(camera: NumberedCamera) -> bytes:
     """Return a sample of a camera that stands still, without timing."""
-    return (json.dumps(_with_sample_id(_sample(shot, _pan_tilt_roll_deg(shot))), indent=2) + "\n").encode()
+    return (json.dumps(_with_sample_id(_sample(camera, _pan_tilt_roll_deg(camera))), indent=2) + "\n").encode()
 
 
-def write_frame(shot: NumberedCamera, frame: Frame, angles: SteadyAngles) -> bytes:
+def write_frame(camera: NumberedCamera, frame: Frame, angles: SteadyAngles) -> bytes:
     """Return a sample of a clip, a line of JSON. Its timecode is 00:00:00:00 at the first frame, and has no drops.
 
     The samples travel beside the video, whose frames they are of: nobody knows by a clock when those were taken.
     """
-    moment = {
-        "tracker": {"status": frame.status},
-        "timing": {
-            "mode": "external",
-            "sampleRate": _rational(frame.rate),
-            "sequenceNumber": frame.number,
-            "timecode": _timecode(frame),
-        },
-    }
-    return (json.dumps(_with_sample_id(_sample(shot, angles.of(shot)) | moment), separators=(",", ":")) + "\n").encode()
+    sample = _timed(camera, frame, angles, {"sequenceNumber": frame.number, "timecode": _timecode(frame)})
+    return (json.dumps(sample, separators=(",", ":")) + "\n").encode()
 
 
-def moment_sample(shot: NumberedCamera, moment: SampleTime, angles: SteadyAngles) -> dict[str, Any]:
+def moment_sample(camera: NumberedCamera, moment: SampleTime, angles: SteadyAngles) -> dict[str, Any]:
     """Return a sample of a stream. Its timestamp is UTC in seconds since 1970 by the clock of the moment."""
     seconds, nanoseconds = divmod(moment.unix_ns, 1_000_000_000)
     timing = {
-        "tracker": {"status": moment.status},
-        "timing": {
-            "mode": "external",
-            "sampleRate": _rational(moment.rate),
-            "sampleTimestamp": {"seconds": seconds, "nanoseconds": nanoseconds},
-            "sequenceNumber": moment.number % SEQUENCE_NUMBERS,
-            **_synchronization(moment),
-        },
+        "sampleTimestamp": {"seconds": seconds, "nanoseconds": nanoseconds},
+        "sequenceNumber": moment.number % SEQUENCE_NUMBERS,
+        **_synchronization(moment),
     }
-    return _with_sample_id(_sample(shot, angles.of(shot)) | timing)
+    return _timed(camera, moment, angles, timing)
+
+
+def _timed(
+    camera: NumberedCamera, moment: SampleTime | Frame, angles: SteadyAngles, timing: dict[str, Any]
+) -> dict[str, Any]:
+    when = {"mode": "external", "sampleRate": _rational(moment.rate), **timing}
+    return _with_sample_id(_sample(camera, angles.of(camera)) | {"tracker": {"status": moment.status}, "timing": when})
 
 
 def _synchronization(moment: SampleTime) -> dict[str, Any]:
@@ -131,14 +125,14 @@ def _synchronization(moment: SampleTime) -> dict[str, Any]:
     return {"synchronization": {"source": moment.clock_source, **locked}}
 
 
-def _sample(shot: NumberedCamera, angles: tuple[float, float, float]) -> dict[str, Any]:
+def _sample(camera: NumberedCamera, angles: tuple[float, float, float]) -> dict[str, Any]:
     return {
         "protocol": {"name": "OpenTrackIO", "version": [1, 0, 1]},
-        "static": {"camera": _sensor(shot)},
-        "lens": _lens(shot),
-        "transforms": [_transform(shot, angles)],
-        "sourceId": uuid.uuid5(SOURCES, shot.id).urn,
-        "sourceNumber": shot.number,
+        "static": {"camera": _sensor(camera)},
+        "lens": _lens(camera),
+        "transforms": [_transform(camera, angles)],
+        "sourceId": uuid.uuid5(SOURCES, camera.id).urn,
+        "sourceNumber": camera.number,
     }
 
 
@@ -171,13 +165,13 @@ def _rational(rate: Fraction) -> dict[str, int]:
     return {"num": rate.numerator, "denom": rate.denominator}
 
 
-def _sensor(shot: NumberedCamera) -> dict[str, Any]:
-    (width, height), (fx, fy) = shot.size, shot.focal
+def _sensor(camera: NumberedCamera) -> dict[str, Any]:
+    (width, height), (fx, fy) = camera.size, camera.focal
     return {
         "make": UNKNOWN,
         "model": UNKNOWN,
-        "serialNumber": shot.id,
-        "label": shot.id,
+        "serialNumber": camera.id,
+        "label": camera.id,
         "activeSensorResolution": {"width": width, "height": height},
         # There is one focal length: pixels that are not square are told by the height.
         "activeSensorPhysicalDimensions": {
@@ -187,11 +181,11 @@ def _sensor(shot: NumberedCamera) -> dict[str, Any]:
     }
 
 
-def _lens(shot: NumberedCamera) -> dict[str, Any]:
-    shot.require_support("opentrackio", {*RADIAL, *TANGENTIAL})
-    (width, height), (fx, fy), (cx, cy) = shot.size, shot.focal, shot.principal
+def _lens(camera: NumberedCamera) -> dict[str, Any]:
+    camera.require_support("opentrackio", {*RADIAL, *TANGENTIAL})
+    (width, height), (fx, fy), (cx, cy) = camera.size, camera.focal, camera.principal
     focal = fx * SENSOR_WIDTH_MM / width
-    k = shot.coefficients
+    k = camera.coefficients
     return {
         "pinholeFocalLength": focal,
         "entrancePupilOffset": 0.0,
@@ -220,9 +214,9 @@ def _lens(shot: NumberedCamera) -> dict[str, Any]:
     }
 
 
-def _transform(shot: NumberedCamera, angles: tuple[float, float, float]) -> dict[str, Any]:
+def _transform(camera: NumberedCamera, angles: tuple[float, float, float]) -> dict[str, Any]:
     pan, tilt, roll = angles
-    x, y, z = shot.pose.position
+    x, y, z = camera.pose.position
     return {
         "id": "camera",
         "translation": {"x": x, "y": y, "z": z},
@@ -230,8 +224,8 @@ def _transform(shot: NumberedCamera, angles: tuple[float, float, float]) -> dict
     }
 
 
-def _pan_tilt_roll_deg(shot: NumberedCamera) -> tuple[float, float, float]:
-    b = product(transposed(shot.rotation), transposed(AHEAD_IS_Y))
+def _pan_tilt_roll_deg(camera: NumberedCamera) -> tuple[float, float, float]:
+    b = product(transposed(camera.rotation), transposed(AHEAD_IS_Y))
     pan, tilt, roll = pan_tilt_roll(b)
     return math.degrees(pan), math.degrees(tilt), math.degrees(roll)
 

@@ -6,26 +6,23 @@ and `esc pose` takes it.
 
 import json
 from collections.abc import Sequence
-
-from pydantic import ValidationError
+from typing import Any
 
 from service.formats.lens import NumberedCamera
-from service.formats.nodes import FileRefusedError, Node
+from service.formats.nodes import Node
 from service.formats.parsing import ParsedFile
-from service.formats.records import CameraRecord, stem_of
+from service.formats.records import CameraRecord, read_lens, stem_of
 from service.formats.rotations import pose_from_translation, read_vector
-from service.schemas.base import TOLERANTLY
-from service.schemas.findings import describe_errors
-from service.schemas.geometry import Intrinsics, Pose
+from service.schemas.geometry import Pose
 
 
-def write(shots: Sequence[NumberedCamera]) -> bytes:
+def write(cameras: Sequence[NumberedCamera]) -> bytes:
     """Return all cameras in one object."""
-    cameras = [shot.camera.model_dump(mode="json") for shot in shots]
-    if len(shots) == 1 and not shots[0].has_pose:
-        lens = {name: cameras[0][name] for name in ("image_size", "intrinsics")}
-        return (json.dumps(lens, indent=2) + "\n").encode()
-    return (json.dumps({"cameras": cameras}, indent=2) + "\n").encode()
+    documents = [camera.camera.model_dump(mode="json") for camera in cameras]
+    whole: dict[str, Any] = {"cameras": documents}
+    if len(cameras) == 1 and not cameras[0].has_pose:
+        whole = {name: documents[0][name] for name in ("image_size", "intrinsics")}
+    return (json.dumps(whole, indent=2) + "\n").encode()
 
 
 def recognises(file: ParsedFile) -> bool:
@@ -47,17 +44,8 @@ def read(file: ParsedFile) -> list[CameraRecord]:
 
 
 def _camera(node: Node, name: str) -> CameraRecord:
-    width, height = (side.integer(1) for side in node["image_size"].elements(2))
-    pose = node.get("pose")
-    return CameraRecord(name, _lens(node["intrinsics"]), (width, height), None if pose is None else _pose(pose))
-
-
-def _lens(node: Node) -> Intrinsics:
-    try:
-        return Intrinsics.model_validate(node.value, **TOLERANTLY)
-    except ValidationError as error:
-        why = "; ".join(describe_errors(error.errors(), None, None))
-        raise FileRefusedError(node.file, node.place, "a lens", why) from None
+    size, lens = node["image_size"].size(), node["intrinsics"]
+    return CameraRecord(name, read_lens(lens, lens.value), size, _pose(node["pose"]) if "pose" in node else None)
 
 
 def _pose(node: Node) -> Pose:

@@ -5,7 +5,8 @@ Pose2Sim does not read it: a fisheye lens is refused. Files that have it, of ani
 """
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from service.formats.lens import COEFFICIENTS, NumberedCamera
 from service.formats.nodes import Node
@@ -13,32 +14,34 @@ from service.formats.parsing import ParsedFile
 from service.formats.records import CameraRecord, lens_of
 from service.formats.rotations import pose_from_translation, read_rotation
 
-# Readers hand the coefficients to OpenCV as they are, and it takes no fewer than four.
-NO_DISTORTION = [0.0] * 5
 
-
-def write(shots: Sequence[NumberedCamera]) -> bytes:
+def write(cameras: Sequence[NumberedCamera]) -> bytes:
     """Return a table for each camera, `cam_01` for the first of the venue; `name` is the camera's id.
 
     Ids are not the tables' names: readers sort these, and take `metadata` or `charuco` for something else.
     """
-    return "\n".join(line for shot in shots for line in [*_table(shot), ""]).encode()
+    return write_tables({f"cam_{camera.number:02}": _members(camera) for camera in cameras})
 
 
-def _table(shot: NumberedCamera) -> list[str]:
-    shot.require_support("pose2sim", COEFFICIENTS)
-    intrinsics, pose = shot.camera.intrinsics, shot.pose
-    members = {
-        "name": shot.id,
-        "size": list(shot.size),
-        "matrix": [[float(value) for value in row] for row in intrinsics.matrix],
-        "distortions": [float(value) for value in intrinsics.distortion or NO_DISTORTION],
-        "rotation": [float(value) for value in pose.rotation],
-        "translation": [float(value) for value in pose.translation],
+def _members(camera: NumberedCamera) -> dict[str, Any]:
+    camera.require_support("pose2sim", COEFFICIENTS)
+    return {
+        "name": camera.id,
+        "size": list(camera.size),
+        "matrix": [[float(value) for value in row] for row in camera.intrinsics.matrix],
+        "distortions": camera.distortion,
+        "rotation": [float(value) for value in camera.pose.rotation],
+        "translation": [float(value) for value in camera.pose.translation],
         "fisheye": False,
     }
-    # Strings without escapes, numbers, booleans and arrays of them are the same in TOML as in JSON.
-    return [f"[cam_{shot.number:02}]", *(f"{name} = {json.dumps(value)}" for name, value in members.items())]
+
+
+def write_tables(tables: Mapping[str, Mapping[str, Any]]) -> bytes:
+    """Return TOML of tables by their names; texts without escapes, numbers, booleans and arrays are as in JSON."""
+    lines: list[str] = []
+    for name, members in tables.items():
+        lines += [f"[{name}]", *(f"{member} = {json.dumps(value)}" for member, value in members.items()), ""]
+    return "\n".join(lines).encode()
 
 
 def recognises(file: ParsedFile) -> bool:
@@ -63,5 +66,4 @@ def read_table(name: str, table: Node) -> CameraRecord:
     pose = None
     if "rotation" in table and "translation" in table:
         pose = pose_from_translation(read_rotation(table["rotation"]), table["translation"].numbers(3))
-    sides = None if size is None else [side.integer(1) for side in size.elements(2)]
-    return CameraRecord(named.text() if named else name, lens, None if sides is None else (sides[0], sides[1]), pose)
+    return CameraRecord(named.text() if named else name, lens, None if size is None else size.size(), pose)

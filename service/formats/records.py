@@ -3,19 +3,20 @@
 Axes and coefficients are OpenCV's, poses go from the world to the camera, pixel centres are at integers.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import PurePath
+from typing import Any
 
 from pydantic import ValidationError
 
-from service.formats.lens import NumberedCamera
-from service.formats.nodes import FileRefusedError, Node
+from service.formats.lens import NumberedCamera, cannot_hold
+from service.formats.nodes import Node
+from service.schemas.base import TOLERANTLY
 from service.schemas.check import CheckedCamera
 from service.schemas.findings import describe_errors
 from service.schemas.geometry import DISTORTION_LENGTHS, Intrinsics, Pose, PosedCamera, UnposedCamera
 from service.schemas.names import LensModel, id_like
-from service.schemas.problems import Problem
 
 
 @dataclass(frozen=True)
@@ -39,12 +40,8 @@ class CameraRecord:
     def numbered(self, number: int) -> NumberedCamera:
         """Return the camera for the writers, which need its picture size: one without is refused."""
         if self.size is None:
-            raise Problem(
-                "format-cannot-hold",
-                f"camera {self.id} has no picture size in its file: give it with --image-size WxH.",
-                camera=self.id,
-                got=["no picture size"],
-            )
+            lacks = f"camera {self.id} has no picture size in its file: give it with --image-size WxH."
+            raise cannot_hold(self.id, lacks, ["no picture size"])
         # Not validated: a check wants to write what no venue would take, such as places in centimetres.
         unposed = UnposedCamera.model_construct(id=self.id, image_size=[*self.size], intrinsics=self.intrinsics)
         if self.pose is None:
@@ -58,12 +55,15 @@ def lens_of(
     """Return a lens of the numbers at a node; coefficients that are absent at the end are zero."""
     length = next((length for length in DISTORTION_LENGTHS[model] if length >= len(coefficients)), len(coefficients))
     padded = [*coefficients, *[0.0] * (length - len(coefficients))]
+    return read_lens(node, {"model": model, "matrix": matrix, "distortion": padded})
+
+
+def read_lens(node: Node, document: Mapping[str, Any]) -> Intrinsics:
+    """Return the lens of a document in ESC's own form; `node`: where it stands."""
     try:
-        return Intrinsics(model=model, matrix=[list(row) for row in matrix], distortion=padded)
+        return Intrinsics.model_validate(document, **TOLERANTLY)
     except ValidationError as error:
-        raise FileRefusedError(
-            node.file, node.place, "a lens", "; ".join(describe_errors(error.errors(), None, None))
-        ) from None
+        node.refuse("a lens", "; ".join(describe_errors(error.errors(), None, None)))
 
 
 def camera_matrix(fx: float, fy: float, cx: float, cy: float) -> list[list[float]]:

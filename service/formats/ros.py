@@ -20,22 +20,22 @@ MODELS: dict[str, LensModel] = {
 }
 
 
-def write(shot: NumberedCamera) -> bytes:
+def write(camera: NumberedCamera) -> bytes:
     """Return the lens of a camera."""
-    if shot.is_fisheye:
-        model, coefficients = "equidistant", shot.fisheye_coefficients
+    if camera.is_fisheye:
+        model, coefficients = "equidistant", camera.distortion
     else:
-        shot.require_support("ros", {*RADIAL, *TANGENTIAL})
-        k = shot.coefficients
+        camera.require_support("ros", {*RADIAL, *TANGENTIAL})
+        k = camera.coefficients
         is_rational = any(k[name] for name in ("k4", "k5", "k6"))
         model = "rational_polynomial" if is_rational else "plumb_bob"
         coefficients = [*k.values()][: 8 if is_rational else 5]
-    matrix = shot.camera.intrinsics.matrix
-    width, height = shot.size
+    matrix = camera.intrinsics.matrix
+    width, height = camera.size
     lines = [
         f"image_width: {width}",
         f"image_height: {height}",
-        f"camera_name: {shot.id}",
+        f"camera_name: {camera.id}",
         *_matrix("camera_matrix", matrix),
         f"distortion_model: {model}",
         *_matrix("distortion_coefficients", [coefficients]),

@@ -16,14 +16,14 @@ from service.formats.rotations import Matrix, product, transposed, vector_of
 from service.schemas.geometry import Pose
 
 
-def write(shot: NumberedCamera) -> bytes:
+def write(camera: NumberedCamera) -> bytes:
     """Return the parameters of a camera: pixels, degrees, metres."""
-    shot.require_support("soccernet", {*RADIAL, *TANGENTIAL, *THIN_PRISM})
+    camera.require_support("soccernet", {*RADIAL, *TANGENTIAL, *THIN_PRISM})
     # y and z turn round: half a turn about x.
-    orientation = transposed([[right, -down, -ahead] for right, down, ahead in shot.rotation])
+    orientation = transposed([[right, -down, -ahead] for right, down, ahead in camera.rotation])
     pan, tilt, roll = (math.degrees(angle) for angle in _pan_tilt_roll(orientation))
-    x, y, z = shot.pose.position
-    (fx, fy), k = shot.focal, shot.coefficients
+    x, y, z = camera.pose.position
+    (fx, fy), k = camera.focal, camera.coefficients
     parameters = {
         "pan_degrees": pan,
         "tilt_degrees": tilt,
@@ -31,7 +31,7 @@ def write(shot: NumberedCamera) -> bytes:
         "position_meters": [x, -y, -z],
         "x_focal_length": fx,
         "y_focal_length": fy,
-        "principal_point": list(shot.principal),
+        "principal_point": list(camera.principal),
         "radial_distortion": [k[name] for name in RADIAL],
         "tangential_distortion": [k[name] for name in TANGENTIAL],
         "thin_prism_distortion": [k[name] for name in THIN_PRISM],

@@ -14,7 +14,7 @@ _turn = threading.Lock()
 
 
 def write(
-    shot: NumberedCamera,
+    camera: NumberedCamera,
     origin: Literal["top-left", "bottom-left"],
     program: Sequence[str],
     environment: Mapping[str, str],
@@ -23,7 +23,7 @@ def write(
     if not _turn.acquire(blocking=False):
         raise Problem("unavailable", "Another set of ST maps is being made.", headers={"Retry-After": "10"})
     try:
-        given = shot.camera.model_dump_json().encode()
+        given = camera.camera.model_dump_json().encode()
         return run_program("set of ST maps", [*program, origin], environment, given, LONGEST_S)
     finally:
         _turn.release()

@@ -70,37 +70,39 @@ class Format(ABC):
     file_name: str | None = None
 
     @abstractmethod
-    def document(self, shots: Sequence[NumberedCamera]) -> ExportedFile:
+    def document(self, cameras: Sequence[NumberedCamera]) -> ExportedFile:
         """Return the file of these cameras, at least one."""
 
 
 class AllCamerasFormat(Format):
     """A format whose file holds all cameras; `write` takes them."""
 
-    def document(self, shots: Sequence[NumberedCamera]) -> ExportedFile:
+    def document(self, cameras: Sequence[NumberedCamera]) -> ExportedFile:
         """Return the file of these cameras."""
-        return ExportedFile(self.write(shots), self.media_type, self.suffix)
+        return ExportedFile(self.write(cameras), self.media_type, self.suffix)
 
 
 class FilePerCameraFormat(Format):
     """A format whose file holds one camera, which `write` takes; the files of several come in a zip."""
 
-    def document(self, shots: Sequence[NumberedCamera]) -> ExportedFile:
+    def document(self, cameras: Sequence[NumberedCamera]) -> ExportedFile:
         """Return the file of the camera, or a zip of files that are named as the cameras."""
-        if len(shots) == 1:
-            return ExportedFile(self.write(shots[0]), self.media_type, self.suffix)
-        return ExportedFile(archive({f"{shot.id}.{self.suffix}": self.write(shot) for shot in shots}), ZIP, "zip")
+        if len(cameras) == 1:
+            return ExportedFile(self.write(cameras[0]), self.media_type, self.suffix)
+        return ExportedFile(
+            archive({f"{camera.id}.{self.suffix}": self.write(camera) for camera in cameras}), ZIP, "zip"
+        )
 
 
 class OneCameraFormat(Format):
     """A format whose file holds one camera, and is too large for more than one in an answer."""
 
-    def document(self, shots: Sequence[NumberedCamera]) -> ExportedFile:
+    def document(self, cameras: Sequence[NumberedCamera]) -> ExportedFile:
         """Return the file of the camera; refuse more than one."""
-        if len(shots) > 1:
-            ids = [shot.id for shot in shots]
+        if len(cameras) > 1:
+            ids = [camera.id for camera in cameras]
             raise Problem("camera-needed", f"Say which, for instance camera={ids[0]}.", expected=ids)
-        return ExportedFile(self.write(shots[0]), self.media_type, self.suffix)
+        return ExportedFile(self.write(cameras[0]), self.media_type, self.suffix)
 
 
 # Formats that are read and written; their lens and conventions: docs/formats.md.

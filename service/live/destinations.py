@@ -58,7 +58,7 @@ class Tracked:
 class Sample:
     """A camera's pose at a moment. `tracked`: None for a stored pose."""
 
-    shot: NumberedCamera
+    camera: NumberedCamera
     moment: opentrackio.SampleTime
     tracked: Tracked | None = None
 
@@ -124,8 +124,8 @@ class OpenTrackIO:
     def send(self, samples: Sequence[Sample]) -> None:
         """Send a sample of each camera, split into datagrams."""
         for sample in samples:
-            host = self.host or OPENTRACKIO_GROUP.format(number=sample.shot.number)
-            content = opentrackio.moment_sample(sample.shot, sample.moment, self._angles)
+            host = self.host or OPENTRACKIO_GROUP.format(number=sample.camera.number)
+            content = opentrackio.moment_sample(sample.camera, sample.moment, self._angles)
             for datagram in datagrams(content, sample.moment.number, self.encoding):
                 self.socket.send(datagram, host, self.port)
 
@@ -143,8 +143,8 @@ class FreeD:
     def send(self, samples: Sequence[Sample]) -> None:
         """Send a packet of each camera."""
         for sample in samples:
-            shot = replace(sample.shot, encoders=self.encoders.get(sample.shot.id))
-            self.socket.send(freed.write([shot], self.axes), self.host, self.port)
+            camera = replace(sample.camera, encoders=self.encoders.get(sample.camera.id))
+            self.socket.send(freed.write([camera], self.axes), self.host, self.port)
 
 
 @dataclass(frozen=True)
@@ -156,7 +156,7 @@ class JsonLines:
     def send(self, samples: Sequence[Sample]) -> None:
         """Write a line for each camera. Raises `BrokenPipeError` if the reader has gone."""
         for sample in samples:
-            moment, camera = sample.moment, sample.shot.posed
+            moment, camera = sample.moment, sample.camera.posed
             line: dict[str, object] = {
                 "time": datetime.fromtimestamp(moment.unix_ns / 1e9, UTC).isoformat(timespec="microseconds"),
                 "number": moment.number,
@@ -199,7 +199,7 @@ class PoseSender:
 
     def send(
         self,
-        shots: Sequence[NumberedCamera],
+        cameras: Sequence[NumberedCamera],
         unix_ns: int,
         rate: Fraction,
         status: str,
@@ -210,11 +210,11 @@ class PoseSender:
         is_locked = None if tracked is not None and tracked.clock == "rtcp" else is_clock_locked()
         with self._lock:
             moments = [
-                opentrackio.SampleTime(unix_ns, self._numbers[shot.id], rate, status, is_locked, self._clock_source)
-                for shot in shots
+                opentrackio.SampleTime(unix_ns, self._numbers[camera.id], rate, status, is_locked, self._clock_source)
+                for camera in cameras
             ]
-            samples = [Sample(shot, moment, tracked) for shot, moment in zip(shots, moments, strict=True)]
-            self._numbers.update(shot.id for shot in shots)
+            samples = [Sample(camera, moment, tracked) for camera, moment in zip(cameras, moments, strict=True)]
+            self._numbers.update(camera.id for camera in cameras)
             for name in [*self._destinations]:
                 self._send_to(name, samples)
 

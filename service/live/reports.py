@@ -121,7 +121,7 @@ class LiveReporter:
     def report(self, *, stopped: bool = False) -> LiveReport:
         """Return the current report, with all counts that were not acknowledged. `stopped`: it is the last one."""
         now = time.monotonic()
-        stored = [shot.posed for shot in self._poses.at(now)]
+        stored = [camera.posed for camera in self._poses.at(now)]
         with self._lock:
             cameras = [self._camera(camera, now) for camera in stored]
         return LiveReport(

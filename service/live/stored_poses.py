@@ -92,7 +92,7 @@ def send_stored_poses(
     """
     begun, beats = time.monotonic(), 0
     while not stop.is_set():
-        stored = [shot for shot in poses.at(time.monotonic()) if not is_tracked(shot.id)]
+        stored = [camera for camera in poses.at(time.monotonic()) if not is_tracked(camera.id)]
         if stored:
             sender.send(stored, time.time_ns(), rate, STORED)
         beats += 1

@@ -54,15 +54,15 @@ class ExportQuery:
 
 def export_response(context: Context, venue: Venue, called: str, form: FormatName, wanted: ExportQuery) -> Response:
     """Return the poses of a venue as a file whose name begins with `called`."""
-    shots = _numbered_cameras(venue, wanted.camera)
+    cameras = _numbered_cameras(venue, wanted.camera)
     if wanted.lens == "refined":
         called = f"{called}-refined"
     # What the document is made of names it: one that the caller has is not computed again.
     made_of: list[Any] = [form, context.settings.freed_axes, version("esc-calibration")]
-    made_of += [[shot.number, shot.camera.model_dump(mode="json")] for shot in shots]
+    made_of += [[one.number, one.camera.model_dump(mode="json")] for one in cameras]
 
     def document() -> Response:
-        written = export_formats(context.settings)[form].document(shots)
+        written = export_formats(context.settings)[form].document(cameras)
         name = "-".join([called, *([wanted.camera] if wanted.camera else []), form])
         head = {"Content-Disposition": f'attachment; filename="{name}.{written.suffix}"'}
         return Response(written.content, headers=head, media_type=written.media_type)
@@ -75,16 +75,16 @@ def with_refined_poses(venue: Venue, refined: dict[str, Refined], camera: str | 
 
     Raises the problem `refined-not-found`, which says `why_none`, for a camera without one.
     """
-    lacking = [shot.id for shot in _numbered_cameras(venue, camera) if shot.id not in refined]
+    lacking = [one.id for one in _numbered_cameras(venue, camera) if one.id not in refined]
     if lacking:
         raise no_refined_pose(lacking[0], f"{why_none} Or ask for lens=stored.")
     return venue.with_cameras({each: {"pose": of.pose, "intrinsics": of.intrinsics} for each, of in refined.items()})
 
 
 def _numbered_cameras(venue: Venue, camera: str | None) -> list[NumberedCamera]:
-    shots = [NumberedCamera(each, number, each.encoders) for number, each in enumerate(venue.cameras, start=1)]
-    chosen = [shot for shot in shots if camera in (None, shot.id)]
+    cameras = [NumberedCamera(each, number, each.encoders) for number, each in enumerate(venue.cameras, start=1)]
+    chosen = [one for one in cameras if camera in (None, one.id)]
     if not chosen:
-        ids = [shot.id for shot in shots]
+        ids = [one.id for one in cameras]
         raise Problem("unknown-camera", f"Ask for one of {', '.join(ids)}.", camera=camera, expected=ids)
     return chosen

@@ -137,7 +137,7 @@ def test_a_sample_says_if_the_machine_holds_its_clock_to_another(monkeypatch, is
     PoseSender({"one": destination}, lambda *_: None, lambda: None, source).send(
         [NumberedCamera(demo().cameras[0], 1)], time.time_ns(), FASTEST, "stored"
     )
-    sample = opentrackio.moment_sample(sent[0].shot, sent[0].moment, opentrackio.SteadyAngles())
+    sample = opentrackio.moment_sample(sent[0].camera, sent[0].moment, opentrackio.SteadyAngles())
     jsonschema_rs.Draft202012Validator(SCHEMA).validate(sample)
     assert sample["timing"].get("synchronization") == expected
 
