@@ -2,7 +2,7 @@
 
 import json
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from pydantic import BaseModel
@@ -49,8 +49,7 @@ def print_answer(answer: BaseModel, *, as_json: bool, with_outcome: bool = True)
                 _print_health(answer)
     match answer:
         case ChangedVenue() | RestoredVenue():
-            for warning in answer.warnings:
-                print_note(f"Warning: {warning}")
+            _print_warnings(answer.warnings)
         case Job() if with_outcome:
             print_outcome(answer)
         case Result() | FindResult() | FieldResult():
@@ -176,29 +175,30 @@ def print_outcome(job: Job) -> None:
 
 def _print_result(result: BaseModel) -> None:
     """Print a summary of a result to standard error, and why it was rejected."""
-    if isinstance(result, Result):
-        for warning in result.warnings:
-            print_note(f"Warning: {warning}")
     match result:
-        case Result(verdict="partly"):
-            accepted = ", ".join(result.accepted_cameras)
-            print_note(f"Accepted: {accepted}. Not all cameras: {result.rejected_because}")
-            return
+        case Result():
+            _print_warnings(result.warnings)
+            if result.verdict == "partly":
+                accepted = ", ".join(result.accepted_cameras)
+                print_note(f"Accepted: {accepted}. Not all cameras: {result.rejected_because}")
+                return
         case IntrinsicsResult():
             print_lens_summary(result)
-            return
         case CheckResult():
             print_checks(result)
-            return
         case LocateResult():
             print_pose_summary(result)
-            return
         case FindResult():
             print_found_summary(result)
         case FieldResult():
             print_field_summary(result)
     if isinstance(result, Result | FindResult | FieldResult) and not result.accepted:
         print_note(f"Rejected: {result.rejected_because}")
+
+
+def _print_warnings(warnings: Sequence[str]) -> None:
+    for warning in warnings:
+        print_note(f"Warning: {warning}")
 
 
 def outcome_text(job: Job) -> str:
@@ -232,8 +232,7 @@ def print_lens_summary(result: IntrinsicsResult) -> None:
         for words in (fate, "is blurred" if photo.blurred else None):
             if words:
                 print_note(f"  {photo.name} {words}")
-    for warning in result.warnings:
-        print_note(f"Warning: {warning}")
+    _print_warnings(result.warnings)
 
 
 def print_checks(result: CheckResult) -> None:
@@ -244,8 +243,7 @@ def print_checks(result: CheckResult) -> None:
         for one in result.cameras
     ]
     print_rows(["CAMERA", "GRADE", "OFF, PX", "OFF, M ON THE GROUND", "CAUSE"], rows)
-    for warning in result.warnings:
-        print_note(f"Warning: {warning}")
+    _print_warnings(result.warnings)
 
 
 def _within(value: float | None, sigma: float | None, digits: int) -> str:

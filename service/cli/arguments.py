@@ -80,6 +80,16 @@ def require_folder_of(file: Path) -> Path:
     return file
 
 
+def existing_file(metavar: str, help: str) -> Any:
+    """Return the argument of a file that is read."""
+    return typer.Argument(metavar=metavar, exists=True, dir_okay=False, help=help)
+
+
+def output_file(help: str) -> Any:
+    """Return the option of a file that is written in the end."""
+    return typer.Option("-o", "--output", callback=require_folder_of, help=help)
+
+
 Sport = Annotated[str | None, typer.Option("--sport", help="Sport of the field: football, tennis ...")]
 FieldSize = Annotated[
     str | None,
@@ -144,14 +154,9 @@ LensOption = Annotated[
 ]
 OneCamera = Annotated[str | None, typer.Option("--camera", metavar="CAMERA", help="Id of one camera; default: all.")]
 Output = Annotated[Path | None, typer.Option("-o", "--output", help="File to write; otherwise standard output.")]
-VenueOutput = Annotated[
-    Path,
-    typer.Option(
-        "-o",
-        "--output",
-        callback=require_folder_of,
-        help="JSON file to write the venue to, for `esc venue put` and `esc run`.",
-    ),
+VenueOutput = Annotated[Path, output_file("JSON file to write the venue to, for `esc venue put` and `esc run`.")]
+Seed = Annotated[
+    int, typer.Option("--seed", min=0, help="Seed of the random numbers; the same seed gives the same result.")
 ]
 Wait = Annotated[bool, typer.Option("--wait", help="Follow the job to its end and print it.")]
 VenueOrFile = Annotated[

@@ -8,9 +8,9 @@ from typing import Annotated, Any
 import typer
 
 from service.cli.answers import exit_code_of_grade, print_checks, print_json
-from service.cli.arguments import FieldSize, Sport, parse_document, parse_field, parse_frame_files
+from service.cli.arguments import FieldSize, Seed, Sport, parse_document, parse_field
 from service.cli.convert import read_calibration, write_calibration
-from service.cli.local_engine import engine_progress, engine_settings, report_job_failures
+from service.cli.local_engine import engine_progress, engine_settings, read_frames, report_job_failures
 from service.cli.printing import USAGE, fail, print_note
 from service.formats.reading import CalibrationFile
 from service.formats.records import CameraRecord
@@ -41,9 +41,7 @@ def check(
         Path | None,
         typer.Option("-o", "--output", help="File or folder for the corrected calibration, in the same format."),
     ] = None,
-    seed: Annotated[
-        int, typer.Option(min=0, help="Seed of the random numbers; the same seed gives the same result.")
-    ] = 0,
+    seed: Seed = 0,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON in place of a table.")] = False,
 ) -> None:
     """Check a calibration of any tool by frames. Exit: 0 good, 1 failed, 2 usage, 3 drifted or wrong, 4 cannot tell.
@@ -53,7 +51,7 @@ def check(
     """
     settings = engine_settings()
     frames = [argument for argument in arguments if "=" in argument and not Path(argument).exists()]
-    files = {camera: [path.read_bytes() for path in paths] for camera, paths in parse_frame_files(frames).items()}
+    files = read_frames(frames)
     paths = [Path(argument) for argument in arguments if argument not in frames]
     if not paths or not files:
         fail("Give the files of a calibration, and a frame of each camera to check, such as left=left.jpg", USAGE)

@@ -10,12 +10,20 @@ import sqlalchemy as sa
 from service.cli.printing import FAILED, USAGE, fail
 from service.settings import Settings
 from service.store.database import UnsupportedDatabase, require_local_file
+from service.worker_lock import AlreadyRunning
 
 
-def require_local_database(settings: Settings) -> None:
-    """Refuse an SQLite file on a network file system, unless a setting allows it."""
-    if not settings.sqlite_on_network:
-        require_local_file(settings.home_database_url)
+@contextmanager
+def prepared_home(settings: Settings, *, with_worker: bool) -> Iterator[None]:
+    """Make database and folders ready for the block that uses them; exit with a line where that fails."""
+    try:
+        with report_database_errors(settings):
+            if not settings.sqlite_on_network:
+                require_local_file(settings.home_database_url)
+            require_folders(settings, with_worker=with_worker)
+            yield
+    except AlreadyRunning as error:
+        fail(str(error), USAGE)
 
 
 @contextmanager

@@ -4,7 +4,7 @@ NumPy and OpenCV read the environment when they are loaded: such a command impor
 """
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 
 from service.cli.arguments import parse_frame_files
@@ -12,9 +12,10 @@ from service.cli.printing import FAILED, fail, problem_text
 from service.cli.progress import progress_bar
 from service.cli.service_settings import load_settings
 from service.intake import image_checks
+from service.schemas.find import SoughtCameraIn
 from service.schemas.job import Progress
 from service.schemas.problems import Problem
-from service.schemas.venue import Venue
+from service.schemas.venue import Camera, Venue
 from service.settings import Settings
 
 
@@ -27,14 +28,27 @@ def engine_settings() -> Settings:
 
 def checked_files(stored: Venue, frames: Sequence[str], settings: Settings) -> dict[str, list[bytes]]:
     """Return the frames of each camera, checked as the service checks an upload."""
-    files = {camera: [path.read_bytes() for path in paths] for camera, paths in parse_frame_files(frames).items()}
+    files = read_frames(frames)
     with report_job_failures():
         image_checks.check_cameras(stored, {camera: len(images) for camera, images in files.items()}, settings)
-        budget = image_checks.PixelBudget(settings)
-        for camera in stored.cameras:
-            for data in files[camera.id]:
-                image_checks.check(camera, data, settings, budget)
+    check_frames(stored.cameras, files, settings)
     return files
+
+
+def read_frames(frames: Sequence[str]) -> dict[str, list[bytes]]:
+    """Return the frames of each camera, from arguments CAMERA=FILE."""
+    return {camera: [path.read_bytes() for path in paths] for camera, paths in parse_frame_files(frames).items()}
+
+
+def check_frames(
+    cameras: Sequence[Camera | SoughtCameraIn], files: Mapping[str, Sequence[bytes]], settings: Settings
+) -> None:
+    """Exit with a line for a frame that is damaged or of another size, before any is decoded."""
+    with report_job_failures():
+        budget = image_checks.PixelBudget(settings)
+        for camera in cameras:
+            for data in files.get(camera.id, ()):
+                image_checks.check(camera, data, settings, budget)
 
 
 @contextmanager

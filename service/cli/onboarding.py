@@ -26,9 +26,10 @@ from service.cli.arguments import (
     Frames,
     Url,
     VenueOutput,
+    existing_file,
+    output_file,
     parse_document,
     parse_frame_files,
-    require_folder_of,
 )
 from service.cli.local_engine import checked_files, engine_progress, engine_settings
 from service.cli.printing import FAILED, REJECTED, USAGE, fail
@@ -47,6 +48,7 @@ LENS_EXAMPLE = (
 )
 # Help is marked up by words in brackets.
 LENS_IN_HELP = re.sub(r"\[(?=[a-z])", r"\\[", LENS_EXAMPLE)
+Pictures = Annotated[Path | None, typer.Option(help="Folder for a picture per camera.")]
 field_app = typer.Typer(no_args_is_help=True, help="The pitch of a venue: fit its length, width and ridge.")
 
 
@@ -66,22 +68,12 @@ def _print_points(sport: str | None) -> None:
 
 
 def intrinsics(
-    photos: Annotated[
-        list[Path],
-        typer.Argument(
-            metavar="PHOTO...", exists=True, dir_okay=False, help="15 to 30 JPEG or PNG photos of the board."
-        ),
-    ],
+    photos: Annotated[list[Path], existing_file("PHOTO...", "15 to 30 JPEG or PNG photos of the board.")],
     board: Annotated[
         str, typer.Option(metavar="9x6", help="Inner corners of the board across and down, where four squares meet.")
     ],
     square: Annotated[float, typer.Option(metavar="METRES", help="Side of a square of the board, in metres.")],
-    output: Annotated[
-        Path,
-        typer.Option(
-            "-o", "--output", callback=require_folder_of, help="JSON file to write the lens to, for `esc pose`."
-        ),
-    ],
+    output: Annotated[Path, output_file("JSON file to write the lens to, for `esc pose`.")],
     charuco: Annotated[
         str | None,
         typer.Option(metavar="4X4_50:0.022", help="For a ChArUco board: dictionary, and side of a marker in metres."),
@@ -111,20 +103,9 @@ def intrinsics(
 
 def pose(
     site: Annotated[
-        Path,
-        typer.Argument(
-            metavar="SITE.json",
-            exists=True,
-            dir_okay=False,
-            help="Id, name and field of the venue; cameras that have poses already, if any.",
-        ),
+        Path, existing_file("SITE.json", "Id, name and field of the venue; cameras that have poses already, if any.")
     ],
-    points: Annotated[
-        Path,
-        typer.Argument(
-            metavar="POINTS.json", exists=True, dir_okay=False, help="Clicked points of the pitch by camera."
-        ),
-    ],
+    points: Annotated[Path, existing_file("POINTS.json", "Clicked points of the pitch by camera.")],
     lenses: Annotated[
         list[str],
         typer.Argument(
@@ -137,7 +118,7 @@ def pose(
         list[str] | None,
         typer.Option(metavar="CAMERA=FILE", help="The frame that the points of a camera were clicked in."),
     ] = None,
-    pictures: Annotated[Path | None, typer.Option(help="Folder for a picture per camera.")] = None,
+    pictures: Pictures = None,
     as_json: AnswerAsJson = False,
     _: Annotated[
         str | None,
@@ -196,13 +177,8 @@ def pose(
 def fit_field(
     venue: Annotated[str, typer.Argument(metavar="VENUE", help="A venue's file, or the id of one that is stored.")],
     frames: Frames,
-    output: Annotated[
-        Path,
-        typer.Option(
-            "-o", "--output", callback=require_folder_of, help="JSON file to write the venue with its fitted field to."
-        ),
-    ],
-    pictures: Annotated[Path | None, typer.Option(help="Folder for a picture per camera.")] = None,
+    output: Annotated[Path, output_file("JSON file to write the venue with its fitted field to.")],
+    pictures: Pictures = None,
     seed: Annotated[
         int | None,
         typer.Option(

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from service.cli.answers import print_json
-from service.cli.arguments import AnswerAsJson, parse_document
+from service.cli.arguments import AnswerAsJson, existing_file, parse_document
 from service.cli.local_engine import engine_settings
 from service.cli.printing import ACCEPTED, REJECTED, print_note, print_rows
 from service.schemas.plan import LineStateName, PlaceChange, PlannedCameraResult, PlannedSite, PlanResult
@@ -16,11 +16,9 @@ from service.schemas.plan import LineStateName, PlaceChange, PlannedCameraResult
 def plan(
     site: Annotated[
         Path,
-        typer.Argument(
-            metavar="SITE.json",
-            exists=True,
-            dir_okay=False,
-            help="A field and its cameras (place, direction, lens, image size), or stands to propose cameras for; the "
+        existing_file(
+            "SITE.json",
+            "A field and its cameras (place, direction, lens, image size), or stands to propose cameras for; the "
             "file of a venue will do.",
         ),
     ],

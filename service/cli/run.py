@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from service.cli.answers import print_answer, write_pictures
-from service.cli.arguments import AnswerAsJson, Frames, OptionsText, parse_document, parse_options
+from service.cli.arguments import AnswerAsJson, Frames, OptionsText, existing_file, parse_document, parse_options
 from service.cli.local_engine import checked_files, engine_progress, engine_settings
 from service.cli.printing import ACCEPTED, REJECTED, USAGE, fail, print_note
 from service.schemas.results import Result
@@ -17,12 +17,7 @@ from service.store.jobs.files import BIRDSEYE, OF_CAMERA, STITCHED, names_of_all
 
 
 def run(
-    venue: Annotated[
-        Path,
-        typer.Argument(
-            metavar="VENUE.json", exists=True, dir_okay=False, help="File of a venue, as `esc venue get` prints it."
-        ),
-    ],
+    venue: Annotated[Path, existing_file("VENUE.json", "File of a venue, as `esc venue get` prints it.")],
     frames: Frames,
     output: Annotated[
         Path, typer.Option("-o", "--output", file_okay=False, help="Folder for result.json and the pictures.")

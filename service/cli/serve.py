@@ -2,11 +2,10 @@
 
 from service import confinement, serving
 from service.cli.arguments import Data, Host, Port
-from service.cli.local_database import report_database_errors, require_folders, require_local_database
+from service.cli.local_database import prepared_home
 from service.cli.printing import USAGE, fail
 from service.cli.service_settings import load_settings
 from service.settings import Settings
-from service.worker_lock import AlreadyRunning
 
 
 def up(data: Data = None, host: Host = None, port: Port = None) -> None:
@@ -23,9 +22,7 @@ def serve(data: Data = None, host: Host = None, port: Port = None) -> None:
 
 def _serve(settings: Settings, *, with_worker: bool) -> None:
     try:
-        with report_database_errors(settings):
-            require_local_database(settings)
-            require_folders(settings, with_worker=with_worker)
+        with prepared_home(settings, with_worker=with_worker):
             serving.serve(settings, with_worker=with_worker)
-    except (serving.CannotListen, AlreadyRunning) as error:
+    except serving.CannotListen as error:
         fail(str(error), USAGE)

@@ -6,10 +6,8 @@ import typer
 
 from service import confinement
 from service.cli.arguments import Data
-from service.cli.local_database import report_database_errors, require_folders, require_local_database
-from service.cli.printing import USAGE, fail
+from service.cli.local_database import prepared_home
 from service.cli.service_settings import load_settings
-from service.worker_lock import AlreadyRunning
 from worker import supervisor
 
 
@@ -25,10 +23,5 @@ def worker(
     """Run a worker alone: it computes the jobs of a service whose database and files its settings name."""
     confinement.hide_memory()
     settings = load_settings(data=data, worker_name=name)
-    try:
-        with report_database_errors(settings):
-            require_local_database(settings)
-            require_folders(settings, with_worker=True)
-            supervisor.run(settings)
-    except AlreadyRunning as error:
-        fail(str(error), USAGE)
+    with prepared_home(settings, with_worker=True):
+        supervisor.run(settings)
