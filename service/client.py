@@ -419,16 +419,25 @@ class AsyncClient:
         return await self._http.request(method, path, **more)
 
     async def _lines(self, path: str, **more: Any) -> AsyncGenerator[str]:
-        """Yield the lines of a stream as they come; raises `Refused`."""
+        """Yield the lines of a stream as they come; raises `Refused`.
+
+        Split by LF alone, unlike those of httpx: names in events may contain separators of Unicode.
+        """
         rest = b""
-        async with self._http.stream("GET", path, timeout=SILENCE_S, **more) as response:
+        async with aclosing(self._pieces(path, timeout=SILENCE_S, **more)) as pieces:
+            async for piece in pieces:
+                *lines, rest = (rest + piece).split(b"\n")
+                for line in lines:
+                    yield line.decode()
+
+    async def _pieces(self, path: str, **more: Any) -> AsyncGenerator[bytes]:
+        """Yield the bytes of a stream as they come; raises `Refused`."""
+        async with self._http.stream("GET", path, **more) as response:
             if not response.is_success:
                 await response.aread()
                 raise refusal(response)
             async for piece in response.aiter_bytes():
-                *lines, rest = _split(rest + piece)
-                for line in lines:
-                    yield line.decode()
+                yield piece
 
     async def _pause(self, seconds: float) -> None:
         await asyncio.sleep(seconds)
@@ -443,16 +452,13 @@ class _Blocking(AsyncClient):
     async def _send(self, method: str, path: str, **more: Any) -> httpx.Response:
         return self.http.request(method, path, **more)
 
-    async def _lines(self, path: str, **more: Any) -> AsyncGenerator[str]:
-        rest = b""
-        with self.http.stream("GET", path, timeout=SILENCE_S, **more) as response:
+    async def _pieces(self, path: str, **more: Any) -> AsyncGenerator[bytes]:
+        with self.http.stream("GET", path, **more) as response:
             if not response.is_success:
                 response.read()
                 raise refusal(response)
             for piece in response.iter_bytes():
-                *lines, rest = _split(rest + piece)
-                for line in lines:
-                    yield line.decode()
+                yield piece
 
     async def _pause(self, seconds: float) -> None:
         time.sleep(seconds)
@@ -544,14 +550,6 @@ def _parse_event(data: str) -> Event | None:
 @cache
 def _event() -> TypeAdapter[Event]:
     return TypeAdapter(Event)
-
-
-def _split(stream: bytes) -> list[bytes]:
-    """Return the lines of a stream of events, the last of them as far as it has come.
-
-    Split by LF alone, unlike `str.splitlines`, which httpx uses: names in events may contain separators of Unicode.
-    """
-    return stream.split(b"\n")
 
 
 def _export_params(form: FormatName, camera: str | None, lens: LensChoice) -> dict[str, str]:

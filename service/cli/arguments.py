@@ -168,6 +168,9 @@ ProjectionOption = Annotated[
 Height = Annotated[str | None, typer.Option("--height", help="In pixels, even, or auto.")]
 FieldOfView = Annotated[str | None, typer.Option("--field-of-view", help="In degrees, or auto.")]
 Horizon = Annotated[str | None, typer.Option("--horizon", help="0: at the top, 1: at the bottom, or auto.")]
+FollowEvery = Annotated[
+    int, typer.Option("--follow-every", min=1, max=25, metavar="N", help="Measure in every Nth picture only.")
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON in place of lines.")]
 AnswerAsJson = Annotated[
     bool, typer.Option("--json", help="Print JSON at a terminal too; what goes to a file or a pipe is JSON anyway.")
@@ -239,11 +242,18 @@ def parse_field(sport: str, size: str | None) -> FieldOfPlay:
     """Return the field of a sport, of its usual size unless one is given (LENGTHxWIDTH, m)."""
     field: dict[str, Any] = {"template": sport}
     if size is not None:
-        match = re.fullmatch(r"(\d+(?:\.\d+)?)[x×](\d+(?:\.\d+)?)", size)
-        if match is None:
-            fail(f"--field {size}: expected LENGTHxWIDTH in metres, for instance 105x68", USAGE)
-        field |= {"length_m": float(match[1]), "width_m": float(match[2])}
+        form = "LENGTHxWIDTH in metres, for instance 105x68"
+        length, width = parse_parts(size, r"(\d+(?:\.\d+)?)[x×](\d+(?:\.\d+)?)", "--field", form)
+        field |= {"length_m": float(length), "width_m": float(width)}
     return parse_document(FieldOfPlay, json.dumps(field), "--sport")
+
+
+def parse_parts(text: str, pattern: str, option: str, form: str) -> tuple[str, ...]:
+    """Return the parts of the value of an option, by the groups of a pattern; `form`: the expected form, in words."""
+    match = re.fullmatch(pattern, text)
+    if match is None:
+        fail(f"{option} {text}: expected {form}", USAGE)
+    return match.groups()
 
 
 def require_cameras(venue: Venue, named: Iterable[str]) -> None:

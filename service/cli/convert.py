@@ -1,12 +1,12 @@
 """`esc convert`: a calibration in the format of another tool."""
 
-import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from service.cli.arguments import parse_parts
 from service.cli.printing import FAILED, USAGE, fail, print_note
 from service.formats.conversion import Crop, cropped, losses, members_of, scaled, write_cameras
 from service.formats.nodes import FileRefusedError
@@ -108,10 +108,9 @@ def write_calibration(cameras: list[CameraRecord], form: FormatName, output: Pat
 
 def parse_size(text: str, option: str) -> tuple[int, int]:
     """Return the width and height of a value WxH."""
-    match = re.fullmatch(r"([1-9]\d{0,4})[x×]([1-9]\d{0,4})", text)
-    if match is None:
-        fail(f"{option} {text}: expected WIDTHxHEIGHT, for instance 1920x1080", USAGE)
-    return int(match[1]), int(match[2])
+    form = "WIDTHxHEIGHT, for instance 1920x1080"
+    width, height = parse_parts(text, r"([1-9]\d{0,4})[x×]([1-9]\d{0,4})", option, form)
+    return int(width), int(height)
 
 
 def _format_of(output: Path) -> FormatName | None:
@@ -122,7 +121,5 @@ def _format_of(output: Path) -> FormatName | None:
 
 
 def _parse_crop(text: str) -> Crop:
-    match = re.fullmatch(r"(\d{1,5}),(\d{1,5}),([1-9]\d{0,4}),([1-9]\d{0,4})", text)
-    if match is None:
-        fail(f"--crop {text}: expected X,Y,WIDTH,HEIGHT, for instance 0,140,1920,800", USAGE)
-    return Crop(*map(int, match.groups()))
+    form = "X,Y,WIDTH,HEIGHT, for instance 0,140,1920,800"
+    return Crop(*map(int, parse_parts(text, r"(\d{1,5}),(\d{1,5}),([1-9]\d{0,4}),([1-9]\d{0,4})", "--crop", form)))

@@ -8,25 +8,24 @@ import threading
 import time
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated
 
 import httpx
 import typer
 
-from service import build
 from service.cli.answers import outcome_text
 from service.cli.arguments import (
     DEFAULT_URL,
     ApiKey,
+    FollowEvery,
     Url,
     VenueOrFile,
     parse_by_camera,
     parse_frame_rate,
     require_cameras,
 )
-from service.cli.printing import FAILED, USAGE, OngoingTrouble, fail, print_note
+from service.cli.printing import USAGE, OngoingTrouble, fail, print_note, require_extra
 from service.cli.service_client import load_venue
 from service.cli.service_settings import load_settings
 from service.cli.tracked_streams import TrackedStreams
@@ -76,9 +75,7 @@ def live(
         ),
     ] = None,
     hold: Annotated[bool, typer.Option("--hold", help="Send only the stored poses, as without any stream.")] = False,
-    follow_every: Annotated[
-        int, typer.Option(min=1, max=25, metavar="N", help="Measure in every Nth picture only.")
-    ] = 1,
+    follow_every: FollowEvery = 1,
     predict: Annotated[
         float,
         typer.Option(
@@ -148,8 +145,8 @@ def live(
     zooms, focuses = _parse_counts(zoom or [], "--zoom"), _parse_counts(focus or [], "--focus")
     if (zooms or focuses) and not freed:
         fail("--zoom and --focus are sent by FreeD alone: add --freed HOST:PORT", USAGE)
-    if cbor and find_spec("cbor2") is None:
-        fail(f"--cbor needs the extra `cbor`: {build.install_command('cbor', sys.executable)}", FAILED)
+    if cbor:
+        require_extra("cbor", "cbor2", "--cbor")
     if not (opentrackio or freed or as_json):
         opentrackio = [MULTICAST]
     trackers: list[tuple[str, tuple[str | None, int]]] = [

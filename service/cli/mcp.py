@@ -1,15 +1,12 @@
 """`esc mcp`: a service for assistants, by the Model Context Protocol on standard input and output."""
 
 import asyncio
-import sys
-from importlib.util import find_spec
 from typing import Annotated
 
 import typer
 
-from service import build
 from service.cli.arguments import DEFAULT_URL, ApiKey, Url
-from service.cli.printing import FAILED, fail
+from service.cli.printing import require_extra
 from service.client import AsyncClient
 
 
@@ -30,8 +27,7 @@ def mcp(
     A program of an assistant starts it and speaks with it over standard input and output. A key of scope `read` lets
     it read, one of scope `calibrate` propose.
     """
-    if find_spec("mcp") is None:
-        fail(f"It needs the extra `mcp`: {build.install_command('mcp', sys.executable)}", FAILED)
+    require_extra("mcp", "mcp", "It")
     from service.cli.mcp_tools import server_of
 
     async def serve() -> None:

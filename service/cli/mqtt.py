@@ -5,17 +5,14 @@ import os
 import re
 import signal
 import ssl
-import sys
-from importlib.util import find_spec
 from typing import TYPE_CHECKING, Annotated
 from urllib.parse import unquote, urlsplit
 
 import typer
 
-from service import build
 from service.cli.arguments import DEFAULT_URL, ApiKey, Url
 from service.cli.home_assistant import Topics
-from service.cli.printing import FAILED, USAGE, fail, print_note
+from service.cli.printing import USAGE, fail, print_note, require_extra
 from service.cli.service_client import open_client
 from service.secret_files import SecretFileError, read_secret
 
@@ -51,8 +48,7 @@ def mqtt(
     has a source a button that calibrates, which needs a key of scope `calibrate`. Beside it a topic for each camera has
     the homographies by which its picture moved at the last new poses.
     """
-    if find_spec("aiomqtt") is None:
-        fail(f"MQTT needs the extra `mqtt`: {build.install_command('mqtt', sys.executable)}", FAILED)
+    require_extra("mqtt", "aiomqtt", "MQTT")
     from service.cli.mqtt_bridge import publish_venues
 
     for option, name in (("--topic", topic), ("--discovery", discovery)):

@@ -3,8 +3,11 @@
 import json
 import sys
 from collections.abc import Iterable, Mapping, Sequence
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NoReturn
+
+from service import build
 
 ACCEPTED, FAILED, USAGE, REJECTED, CANNOT_TELL, BUSY = 0, 1, 2, 3, 4, 75
 ZIP_START = b"PK"
@@ -60,6 +63,12 @@ def fail(message: str, code: int) -> NoReturn:
     """Print a line to standard error and exit with `code`."""
     print_note(message)
     sys.exit(code)
+
+
+def require_extra(extra: str, module: str, what: str) -> None:
+    """Exit unless the module of an extra is installed, for `what` needs it."""
+    if find_spec(module) is None:
+        fail(f"{what} needs the extra `{extra}`: {build.install_command(extra, sys.executable)}", FAILED)
 
 
 def problem_text(headline: str, members: Mapping[str, Any]) -> str:

@@ -11,6 +11,7 @@ from service.cli.arguments import (
     ApiKey,
     AsJson,
     FieldOfView,
+    FollowEvery,
     Height,
     Horizon,
     ProjectionOption,
@@ -87,9 +88,7 @@ def stitch(
     follow: Annotated[
         bool, typer.Option("--follow", help="Cameras shake: find where each is in every picture, by its lines.")
     ] = False,
-    follow_every: Annotated[
-        int, typer.Option(min=1, max=25, metavar="N", help="Measure in every Nth picture only.")
-    ] = 1,
+    follow_every: FollowEvery = 1,
     poses_out: Annotated[
         Path | None,
         typer.Option(

@@ -29,43 +29,6 @@ from service.schemas.options import FindOptions
 from service.schemas.results import FindResult
 from service.store.jobs.files import CANDIDATE
 
-AdoptedCamera = Annotated[
-    str | None,
-    typer.Argument(
-        metavar="[CAMERA]",
-        callback=check_id,
-        help="Id of the camera whose lens is stored, as `esc venue list` prints it.",
-    ),
-]
-AdoptedField = Annotated[
-    FieldNumber | None, typer.Option("--field", help="Store a measure of the field instead of a lens; needs --job.")
-]
-AdoptedJob = Annotated[
-    str | None,
-    typer.Option("--job", metavar="JOB", callback=check_job_id, help="The calibration that measured it."),
-]
-AdoptedFinding = Annotated[
-    str | None,
-    typer.Option(
-        "--found",
-        metavar="JOB",
-        callback=check_job_id,
-        help="Store the cameras that this job of `esc venue find` found, instead of a lens.",
-    ),
-]
-CalibrateFound = Annotated[
-    bool, typer.Option("--calibrate", help="With --found: then calibrate the venue with the frames of that job.")
-]
-Candidates = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--candidate",
-        metavar="CAMERA=NUMBER",
-        help="With --found: number of the candidate to take for a camera, from 1; 0 takes none. "
-        "Default: the first, for accepted cameras.",
-    ),
-]
-
 
 def find_cameras(
     client: Client,
@@ -133,12 +96,39 @@ def find_cameras(
 def adopt(
     client: Client,
     venue: VenueId,
-    camera: AdoptedCamera = None,
-    field: AdoptedField = None,
-    job: AdoptedJob = None,
-    found: AdoptedFinding = None,
-    candidate: Candidates = None,
-    calibrate: CalibrateFound = False,
+    camera: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="[CAMERA]",
+            callback=check_id,
+            help="Id of the camera whose lens is stored, as `esc venue list` prints it.",
+        ),
+    ] = None,
+    field: Annotated[
+        FieldNumber | None, typer.Option(help="Store a measure of the field instead of a lens; needs --job.")
+    ] = None,
+    job: Annotated[
+        str | None, typer.Option(metavar="JOB", callback=check_job_id, help="The calibration that measured it.")
+    ] = None,
+    found: Annotated[
+        str | None,
+        typer.Option(
+            metavar="JOB",
+            callback=check_job_id,
+            help="Store the cameras that this job of `esc venue find` found, instead of a lens.",
+        ),
+    ] = None,
+    candidate: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="CAMERA=NUMBER",
+            help="With --found: number of the candidate to take for a camera, from 1; 0 takes none. "
+            "Default: the first, for accepted cameras.",
+        ),
+    ] = None,
+    calibrate: Annotated[
+        bool, typer.Option("--calibrate", help="With --found: then calibrate the venue with the frames of that job.")
+    ] = False,
     as_json: AnswerAsJson = False,
 ) -> None:
     """Store what the lines of a job say of a lens, of the field, or of where cameras stand, as a new revision.
