@@ -6,8 +6,9 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -202,67 +203,73 @@ def _send(
 
     sender = PoseSender(destinations, note_delivery, end_unread, clock)
     reporter = LiveReporter(poses, addresses, [*destinations])
-    streams = TrackedStreams.of(stored, addresses, every, ahead_s, sender, reporter.sent)
+    streams = TrackedStreams(stored, addresses, every, ahead_s, sender, reporter.sent)
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: stop.set())
-    reports = []
-    if service is not None:
-        threading.Thread(target=_ask_for_poses, args=(poses, streams, reporter, *service, stop), daemon=True).start()
-        reports = [threading.Thread(target=_report, args=(reporter, *service, stop), daemon=True)]
-        if recover:
-            threading.Thread(target=_recover, args=(stored.id, streams, *service, stop), daemon=True).start()
     cameras = ", ".join(f"{camera.id} (source {n})" for n, camera in enumerate(stored.cameras, 1))
     print_note(f"Sending the poses of venue {stored.id}, stored ones {float(sample_rate):g} times a second: {cameras}")
     streams.start()
-    for thread in reports:
-        thread.start()
+    tasks: list[Callable[[Client], None]] = [
+        partial(_report, reporter=reporter, stop=stop),
+        partial(_ask_for_poses, poses=poses, streams=streams, reporter=reporter, stop=stop),
+    ]
+    if recover:
+        recovery = Recovery(stored.id, streams, _RecoveryNotes())
+        tasks.append(partial(recovery.run, stop=stop))
+    threads = [_start(task, *service) for task in tasks] if service is not None else []
     send_stored_poses(poses, sender, sample_rate, stop, streams.is_tracked)
     streams.stop()
-    for thread in reports:
+    # Of the threads only the one that reports has something left to do.
+    for thread in threads[:1]:
         thread.join(LAST_REPORT_S)
     # A filter whose reader has gone says nothing.
     if not unread.is_set():
         print_note("Stopped.")
 
 
-def _report(reporter: LiveReporter, url: str, api_key: str | None, stop: threading.Event) -> None:
+def _start(task: Callable[[Client], None], url: str, api_key: str | None) -> threading.Thread:
+    """Start a task with a client of the service, in a thread of its own."""
+
+    def run() -> None:
+        with Client(url, api_key) as client:
+            task(client)
+
+    thread = threading.Thread(target=run, daemon=True)
+    thread.start()
+    return thread
+
+
+def _report(client: Client, reporter: LiveReporter, stop: threading.Event) -> None:
     """Report the state of the live poses to the service, until stopped."""
     trouble = OngoingTrouble()
-    with Client(url, api_key) as client:
-        reporter.run(
-            client,
-            stop,
-            lambda why: trouble.say(f"Poses are sent, but the service does not take reports of them: {why}"),
-            lambda: trouble.over("The service takes reports again"),
-        )
+    reporter.run(
+        client,
+        stop,
+        lambda why: trouble.say(f"Poses are sent, but the service does not take reports of them: {why}"),
+        lambda: trouble.over("The service takes reports again"),
+    )
 
 
 def _ask_for_poses(
-    poses: StoredPoses,
-    streams: TrackedStreams,
-    reporter: LiveReporter,
-    url: str,
-    api_key: str | None,
-    stop: threading.Event,
+    client: Client, poses: StoredPoses, streams: TrackedStreams, reporter: LiveReporter, stop: threading.Event
 ) -> None:
     """Poll the service for new poses, which replace those in use, and for other senders of the venue, until stopped."""
     trouble, company, venue = OngoingTrouble(), OngoingTrouble(), poses.venue.id
     look_for_others_s = time.monotonic() + OTHERS_AFTER_S
-    with Client(url, api_key) as client:
-        while not stop.wait(LOOK_AGAIN_S):
-            try:
-                now = client.venue(venue)
-                new = poses.replace(now, time.monotonic())
-                if time.monotonic() >= look_for_others_s:
-                    look_for_others_s = time.monotonic() + OTHERS_AGAIN_S
-                    _print_company(company, reporter.running_others(client.live(venue)))
-            except (Refused, NotUnderstood, httpx.HTTPError) as error:
-                trouble.say(f"Poses stay as they are, the service does not tell them: {error}")
-                continue
-            trouble.over("The service tells its poses again")
-            if new:
-                streams.anchor([camera for camera in now.cameras if camera.id in new])
-                print_note(f"New pose or lens: {', '.join(new)}")
+    while not stop.wait(LOOK_AGAIN_S):
+        try:
+            now = client.venue(venue)
+            new = poses.replace(now, time.monotonic())
+            if time.monotonic() >= look_for_others_s:
+                look_for_others_s = time.monotonic() + OTHERS_AGAIN_S
+                _print_company(company, reporter.running_others(client.live(venue)))
+        except (Refused, NotUnderstood, httpx.HTTPError) as error:
+            trouble.say(f"Poses stay as they are, the service does not tell them: {error}")
+            continue
+        trouble.over("The service tells its poses again")
+        if new:
+            streams.anchor([camera for camera in now.cameras if camera.id in new])
+            print_note(f"New pose or lens: {', '.join(new)}")
 
 
 def _print_company(company: OngoingTrouble, others: Sequence[str]) -> None:
@@ -272,12 +279,6 @@ def _print_company(company: OngoingTrouble, others: Sequence[str]) -> None:
         )
     else:
         company.over("No other process sends poses of this venue any more")
-
-
-def _recover(venue: str, streams: TrackedStreams, url: str, api_key: str | None, stop: threading.Event) -> None:
-    """Have the service calibrate the venue where cameras are lost, until stopped."""
-    with Client(url, api_key) as client:
-        Recovery(venue, streams, _RecoveryNotes()).run(client, stop)
 
 
 class _RecoveryNotes:

@@ -2,9 +2,7 @@
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING
 
 from service.cli.arguments import require_cameras
 from service.cli.local_engine import engine_settings
@@ -21,37 +19,33 @@ if TYPE_CHECKING:
 FRAME_QUALITY = 95
 
 
-@dataclass
 class TrackedStreams:
-    """The cameras of a `venue` that are tracked, by their ids; `sent` is called with each pose after it was sent.
+    """The cameras of a venue that are tracked, by their ids.
 
     The engine is imported for tracked cameras alone: stored poses are sent without it.
     """
 
-    venue: Venue
-    sender: PoseSender
-    sent: Callable[[SentPose], None]
-    cameras: "dict[str, StreamTracker]" = field(default_factory=dict, init=False)
-    _last_s: dict[str, float] = field(default_factory=dict, init=False)
-    _trouble: dict[str, OngoingTrouble] = field(default_factory=dict, init=False)
+    cameras: "dict[str, StreamTracker]"
 
-    @classmethod
-    def of(
-        cls,
+    def __init__(
+        self,
         venue: Venue,
         addresses: Mapping[str, str],
         every: int,
         ahead_s: float,
         sender: PoseSender,
         sent: Callable[[SentPose], None],
-    ) -> Self:
-        """Return the cameras of a venue of which a stream is given.
+    ) -> None:
+        """`addresses`: of the streams, by camera; lines are measured in every so many-th picture.
 
-        `every`: lines are measured in every so many-th picture; `ahead_s`: poses are sent as they will be so long after
-        their pictures; `sent` is called with each.
+        `ahead_s`: poses are sent as they will be so long after their pictures; `sent` is called with each after that.
         """
-        found = cls(venue, sender, sent)
         require_cameras(venue, addresses)
+        self.numbers = {camera.id: number for number, camera in enumerate(venue.cameras, 1)}
+        self.sender, self.sent = sender, sent
+        self.cameras = {}
+        self._last_s: dict[str, float] = {}
+        self._trouble = {camera: OngoingTrouble() for camera in addresses}
         if addresses:
             engine_settings()
             from worker.jobs.from_schemas import camera_with_ignored_areas, pitch_of
@@ -61,16 +55,10 @@ class TrackedStreams:
             for camera in venue.cameras:
                 if camera.id in addresses:
                     stored = camera_with_ignored_areas(camera, camera.ignore)
-                    trouble = found._trouble[camera.id] = OngoingTrouble()
-                    found.cameras[camera.id] = StreamTracker(
-                        pitch, stored, addresses[camera.id], every, found._report, trouble.say, print_note, ahead_s
+                    say = self._trouble[camera.id].say
+                    self.cameras[camera.id] = StreamTracker(
+                        pitch, stored, addresses[camera.id], every, self._report, say, print_note, ahead_s
                     )
-        return found
-
-    @cached_property
-    def numbers(self) -> dict[str, int]:
-        """Number of each camera in the venue, from 1."""
-        return {camera.id: number for number, camera in enumerate(self.venue.cameras, 1)}
 
     def start(self) -> None:
         """Start the trackers."""

@@ -12,7 +12,9 @@ from service.formats.nodes import Node
 from service.formats.parsing import ParsedFile
 from service.formats.records import CameraRecord, camera_matrix, lens_of
 from service.formats.rotations import (
+    IDENTITY,
     Matrix,
+    applied,
     pose_from_matrix,
     pose_from_translation,
     product,
@@ -63,8 +65,8 @@ def _row(numbers: Sequence[float]) -> str:
 
 def _transform(before: NumberedCamera, camera: NumberedCamera) -> Matrix:
     turn = product(camera.rotation, transposed(before.rotation))
-    turned = product(turn, [[part] for part in before.pose.translation])
-    moved = [part - by for part, (by,) in zip(camera.pose.translation, turned, strict=True)]
+    turned = applied(turn, before.pose.translation)
+    moved = [part - by for part, by in zip(camera.pose.translation, turned, strict=True)]
     return [*([*row, part] for row, part in zip(turn, moved, strict=True)), [0.0, 0.0, 0.0, 1.0]]
 
 
@@ -106,7 +108,7 @@ def _lens(camera: Node) -> tuple[Intrinsics, tuple[int, int]]:
 
 def _chained(cameras: Sequence[tuple[str, Node]]) -> list[Pose | None]:
     """Return the poses by the way from camera to camera, the first one in the origin; None without such a way."""
-    turn, moved = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], [0.0, 0.0, 0.0]
+    turn, moved = IDENTITY, [0.0, 0.0, 0.0]
     if not any("T_cn_cnm1" in camera for _, camera in cameras):
         return [None for _ in cameras]
     poses: list[Pose | None] = []
@@ -115,9 +117,7 @@ def _chained(cameras: Sequence[tuple[str, Node]]) -> list[Pose | None]:
             node = camera["T_cn_cnm1"]
             rotation, translation = split_matrix(node)
             rotation_of(node, rotation)
-            moved = [
-                part + by for part, (by,) in zip(translation, product(rotation, [[m] for m in moved]), strict=True)
-            ]
+            moved = [part + by for part, by in zip(translation, applied(rotation, moved), strict=True)]
             turn = product(rotation, turn)
         poses.append(pose_from_translation(vector_of(turn), moved))
     return poses

@@ -18,7 +18,7 @@ from service.formats.lens import RADIAL, TANGENTIAL, NumberedCamera
 from service.formats.nodes import Node
 from service.formats.parsing import ParsedFile
 from service.formats.records import CameraRecord, camera_matrix, lens_of, stem_of
-from service.formats.rotations import Matrix, product, transposed, vector_of
+from service.formats.rotations import IDENTITY, about, applied, product, transposed, vector_of
 from service.schemas.geometry import Pose
 from service.schemas.problems import Problem
 
@@ -281,22 +281,13 @@ def _coefficients(model: Node, focal: float) -> list[float]:
 
 def _pose(top: Node) -> Pose:
     """Return the pose after all transforms, each in the frame of the one before, and the offset of the pupil."""
-    turned, place = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], [0.0, 0.0, 0.0]
+    turned, place = IDENTITY, [0.0, 0.0, 0.0]
     for transform in top["transforms"].elements():
-        moved = [[transform["translation"][axis].number()] for axis in "xyz"]
-        place = [at + by for at, (by,) in zip(place, product(turned, moved), strict=True)]
-        angles = (transform["rotation"][name].number() for name in ("pan", "tilt", "roll"))
-        turned = product(turned, _from_pan_tilt_roll(*map(math.radians, angles)))
+        moved = applied(turned, [transform["translation"][axis].number() for axis in "xyz"])
+        place = [at + by for at, by in zip(place, moved, strict=True)]
+        for axis, name in (("z", "pan"), ("x", "tilt"), ("y", "roll")):
+            turned = product(turned, about(axis, math.radians(transform["rotation"][name].number())))
     pupil = top["lens"].get("entrancePupilOffset")
     ahead = 0.0 if pupil is None else pupil.number()
     place = [at + ahead * row[1] for at, row in zip(place, turned, strict=True)]
     return Pose.from_position(vector_of(transposed(product(turned, AHEAD_IS_Y))), place)
-
-
-def _from_pan_tilt_roll(pan: float, tilt: float, roll: float) -> Matrix:
-    """Return the matrix (3, 3), camera (x right, y ahead, z up) to world, of intrinsic z-x-y angles."""
-    (cp, ct, cr), (sp, st, sr) = ([turn(angle) for angle in (pan, tilt, roll)] for turn in (math.cos, math.sin))
-    about_z = [[cp, -sp, 0.0], [sp, cp, 0.0], [0.0, 0.0, 1.0]]
-    about_x = [[1.0, 0.0, 0.0], [0.0, ct, -st], [0.0, st, ct]]
-    about_y = [[cr, 0.0, sr], [0.0, 1.0, 0.0], [-sr, 0.0, cr]]
-    return product(product(about_z, about_x), about_y)

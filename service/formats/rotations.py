@@ -8,6 +8,7 @@ from service.schemas.geometry import Pose
 from service.schemas.rotation import rotate
 
 Matrix = list[list[float]]
+IDENTITY: Matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
 
 # Files have rotations with three decimals and more.
 ORTHONORMAL_WITHIN = 5e-3
@@ -27,6 +28,16 @@ def matrix_of(rotation: Sequence[float]) -> Matrix:
     """Return the matrix (3, 3) of a Rodrigues vector."""
     axes = ([1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0])
     return transposed([rotate(list(rotation), axis) for axis in axes])
+
+
+def about(axis: str, angle: float) -> Matrix:
+    """Return the matrix (3, 3) of a turn about an axis x, y or z."""
+    return matrix_of([angle if name == axis else 0.0 for name in "xyz"])
+
+
+def applied(matrix: Matrix, vector: Sequence[float]) -> list[float]:
+    """Return the product of a matrix and a vector."""
+    return [sum(x * y for x, y in zip(row, vector, strict=True)) for row in matrix]
 
 
 def quaternion(rotation: Sequence[float]) -> list[float]:

@@ -12,7 +12,7 @@ from service.formats.lens import RADIAL, TANGENTIAL, THIN_PRISM, NumberedCamera
 from service.formats.nodes import Node
 from service.formats.parsing import ParsedFile
 from service.formats.records import CameraRecord, camera_matrix, lens_of, stem_of
-from service.formats.rotations import Matrix, product, transposed, vector_of
+from service.formats.rotations import Matrix, about, product, transposed, vector_of
 from service.schemas.geometry import Pose
 
 
@@ -48,7 +48,7 @@ def _pan_tilt_roll(o: Matrix) -> tuple[float, float, float]:
         return math.atan2(o[1][0], o[0][0]), tilt, 0.0
     pan = math.atan2(o[0][2], -o[1][2])
     # What is left: nearly straight down, pan and roll are hardly known one by one, but well together.
-    left = product(transposed(product(_about_z(pan), _about_x(tilt))), o)
+    left = product(transposed(product(about("z", pan), about("x", tilt))), o)
     return pan, tilt, math.atan2(left[1][0], left[0][0])
 
 
@@ -61,7 +61,7 @@ def read(file: ParsedFile) -> list[CameraRecord]:
     """Return the camera of a file, named as the file."""
     node = _parameters(file.top)
     pan, tilt, roll = (math.radians(node[f"{name}_degrees"].number()) for name in ("pan", "tilt", "roll"))
-    orientation = product(product(_about_z(pan), _about_x(tilt)), _about_z(roll))
+    orientation = product(product(about("z", pan), about("x", tilt)), about("z", roll))
     rotation = [[right, -down, -ahead] for right, down, ahead in transposed(orientation)]
     x, y, z = node["position_meters"].numbers(3)
     centre = node["principal_point"].numbers(2)
@@ -81,13 +81,3 @@ def read(file: ParsedFile) -> list[CameraRecord]:
 
 def _parameters(top: Node) -> Node:
     return top.get("cam_params") or top
-
-
-def _about_z(angle: float) -> Matrix:
-    cos, sin = math.cos(angle), math.sin(angle)
-    return [[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]]
-
-
-def _about_x(angle: float) -> Matrix:
-    cos, sin = math.cos(angle), math.sin(angle)
-    return [[1.0, 0.0, 0.0], [0.0, cos, -sin], [0.0, sin, cos]]
