@@ -4,6 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from types import ModuleType
 from typing import TYPE_CHECKING
 
 from service.formats import (
@@ -51,9 +52,9 @@ class Reader:
     read: Callable[[Sequence[ParsedFile]], list[CameraRecord]]
 
     @classmethod
-    def of(cls, recognises: Callable[[ParsedFile], bool], read: Callable[[ParsedFile], list[CameraRecord]]) -> "Reader":
-        """Return the reader of a format each of whose files stands by itself."""
-        return cls(recognises, lambda files: [camera for file in files for camera in read(file)])
+    def of(cls, module: ModuleType) -> "Reader":
+        """Return the reader of the module of a format each of whose files stands by itself."""
+        return cls(module.recognises, lambda files: [camera for file in files for camera in module.read(file)])
 
 
 @dataclass(frozen=True)
@@ -107,32 +108,18 @@ class OneCameraFormat(Format):
 
 # Formats that are read and written; their lens and conventions: docs/formats.md.
 FILE_FORMATS: Mapping[FormatName, Format] = {
-    "json": AllCamerasFormat(JSON, "json", plain.write, Reader.of(plain.recognises, plain.read)),
-    "opencv": FilePerCameraFormat(YAML, "yml", opencv.write, Reader.of(opencv.recognises, opencv.read)),
-    "opentrackio": FilePerCameraFormat(
-        JSON, "json", opentrackio.write, Reader.of(opentrackio.recognises, opentrackio.read)
-    ),
+    "json": AllCamerasFormat(JSON, "json", plain.write, Reader.of(plain)),
+    "opencv": FilePerCameraFormat(YAML, "yml", opencv.write, Reader.of(opencv)),
+    "opentrackio": FilePerCameraFormat(JSON, "json", opentrackio.write, Reader.of(opentrackio)),
     "colmap": AllCamerasFormat(ZIP, "zip", colmap.write, Reader(colmap.recognises, colmap.read)),
-    "soccernet": FilePerCameraFormat(JSON, "json", soccernet.write, Reader.of(soccernet.recognises, soccernet.read)),
-    "pose2sim": AllCamerasFormat(
-        TOML, "toml", pose2sim.write, Reader.of(pose2sim.recognises, pose2sim.read), file_name="Calib.toml"
-    ),
-    "metropolis": AllCamerasFormat(
-        JSON, "json", metropolis.write, Reader.of(metropolis.recognises, metropolis.read), file_name="calibration.json"
-    ),
-    "caliscope": AllCamerasFormat(
-        TOML, "toml", caliscope.write, Reader.of(caliscope.recognises, caliscope.read), file_name="camera_array.toml"
-    ),
-    "kalibr": AllCamerasFormat(
-        YAML, "yaml", kalibr.write, Reader.of(kalibr.recognises, kalibr.read), file_name="camchain.yaml"
-    ),
-    "ros": FilePerCameraFormat(
-        YAML, "yaml", ros.write, Reader.of(ros.recognises, ros.read), file_name="camera_info.yaml"
-    ),
-    "mrcal": FilePerCameraFormat("text/plain", "cameramodel", mrcal.write, Reader.of(mrcal.recognises, mrcal.read)),
-    "nerf": AllCamerasFormat(
-        JSON, "json", nerf.write, Reader.of(nerf.recognises, nerf.read), file_name="transforms.json"
-    ),
+    "soccernet": FilePerCameraFormat(JSON, "json", soccernet.write, Reader.of(soccernet)),
+    "pose2sim": AllCamerasFormat(TOML, "toml", pose2sim.write, Reader.of(pose2sim), file_name="Calib.toml"),
+    "metropolis": AllCamerasFormat(JSON, "json", metropolis.write, Reader.of(metropolis), file_name="calibration.json"),
+    "caliscope": AllCamerasFormat(TOML, "toml", caliscope.write, Reader.of(caliscope), file_name="camera_array.toml"),
+    "kalibr": AllCamerasFormat(YAML, "yaml", kalibr.write, Reader.of(kalibr), file_name="camchain.yaml"),
+    "ros": FilePerCameraFormat(YAML, "yaml", ros.write, Reader.of(ros), file_name="camera_info.yaml"),
+    "mrcal": FilePerCameraFormat("text/plain", "cameramodel", mrcal.write, Reader.of(mrcal)),
+    "nerf": AllCamerasFormat(JSON, "json", nerf.write, Reader.of(nerf), file_name="transforms.json"),
 }
 
 
