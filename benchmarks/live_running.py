@@ -22,10 +22,10 @@ from numpy.typing import NDArray
 
 from benchmarks.shaking import FRAMES_PER_SECOND, SIZES, SWING_HZ, Clip, stored_camera
 from demo.render import HERE
-from service.cli.tracked_poses import camera_document
 from testbed.rtsp import Cameras, Taken, encode, filming
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.rotation import rotation_angles_deg
+from worker.jobs.to_schemas import posed_camera_to_schema
 
 FOLDER, VENUE = Path("build/live"), "demo"
 # After so many pictures of a clip the motion of its camera is as it was.
@@ -176,7 +176,7 @@ def running(
         truths[path] = film.truth(clip)
     venue = json.loads((HERE / "venue.json").read_text())
     stored = [stored_camera(clip.still, number, "exact") for number, clip in enumerate(clips)]
-    venue["cameras"] = [camera_document(camera).model_dump(mode="json", exclude_unset=True) for camera in stored]
+    venue["cameras"] = [posed_camera_to_schema(camera).model_dump(mode="json", exclude_unset=True) for camera in stored]
     environment = os.environ | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
     if url is None:
         named = str(FOLDER / "venue.json")

@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 import yaml
 
-from service.cli.tracked_poses import camera_document
 from service.formats import colmap, metropolis, plain
 from service.formats.lens import NumberedCamera
 from service.schemas.field import FieldOfPlay
@@ -23,6 +22,7 @@ from testbed.synthetic import BARREL, PITCH, camera, ground_behind, paint_frame,
 from worker.calibration.stitching.panorama import panorama
 from worker.calibration.stitching.views import ViewChoice as EngineChoice
 from worker.calibration.stitching.views import chosen_view
+from worker.jobs.to_schemas import posed_camera_to_schema
 from worker.programs.stitch.__main__ import stitched
 from worker.programs.stitch.package import package
 
@@ -47,7 +47,7 @@ def run(heading, folder):
 
 
 def numbered(cameras):
-    return [NumberedCamera(camera_document(one), number) for number, one in enumerate(cameras, start=1)]
+    return [NumberedCamera(posed_camera_to_schema(one), number) for number, one in enumerate(cameras, start=1)]
 
 
 def test_maps_take_the_place_of_the_stitcher_of_opencv(tmp_path):

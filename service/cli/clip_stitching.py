@@ -1,25 +1,30 @@
-"""Clips stitched on this machine: the engine's part of `esc stitch`, and the report of the clip that it wrote.
+"""Clips stitched on this machine: the engine's part of `esc stitch`, the report of the clip, and poses beside it.
 
 Imports the engine, see `local_engine`.
 """
 
 import json
-from collections.abc import Mapping
-from contextlib import ExitStack
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
 from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
 from service.cli.printing import FAILED, fail, print_note
 from service.cli.progress import progress_bar
-from service.cli.tracked_poses import motion_document, print_motions, tracking
+from service.formats.clip import ClipPoses, TrackedCamera
+from service.formats.lens import NumberedCamera
+from service.schemas.problems import Problem
 from service.schemas.venue import Venue
 from service.schemas.view import ViewChoice
 from worker.calibration.stitching.coverage import Unseen
+from worker.calibration.tracking.follower import TrackedMoment, TrackedPose
 from worker.jobs.from_schemas import camera_of, choice_of, light_of, pitch_of
+from worker.jobs.to_schemas import posed_camera_to_schema
 from worker.video.errors import VideoError
 from worker.video.stitch import Plan, StaticGeometry, StitchReport, StitchScene, stitch
-from worker.video.tracking import MotionSummary
+from worker.video.tracking import MotionSummary, TrackedGeometryFactory
 
 # A smaller part of the view that no camera sees is not worth a line.
 LEAST_UNSEEN = 0.001
@@ -48,14 +53,14 @@ def stitch_clips(
     scene = StitchScene(pitch_of(venue.field), cameras, choice, lights or None)
     try:
         with ExitStack() as stack:
-            tracked = stack.enter_context(tracking(venue, track_every or 1, poses, freed_axes))
+            tracked = stack.enter_context(_tracking(venue, track_every or 1, poses, freed_axes))
             show = stack.enter_context(progress_bar())
             geometry = StaticGeometry if track_every is None else tracked
             report = stitch(scene, addresses, plan, show, geometry, _print_unseen)
     except VideoError as fault:
         fail(str(fault), FAILED)
     _print_summary(report)
-    print_motions(tracked.motions)
+    _print_motions(tracked.motions)
     if as_json:
         print(json.dumps(_json_document(report, plan.output, tracked.motions), indent=2))
 
@@ -110,7 +115,60 @@ def _json_document(report: StitchReport, output: str, motions: Mapping[str, Moti
                 "broken_frames": report.broken[camera],
                 "repeated": report.repeated[camera],
             }
-            | ({"followed": motion_document(motions[camera])} if camera in motions else {})
+            | ({"followed": _motion_document(motions[camera])} if camera in motions else {})
             for camera, offset in report.offsets.items()
         },
     }
+
+
+@contextmanager
+def _tracking(venue: Venue, every: int, stem: Path | None, freed_axes: str) -> Iterator[TrackedGeometryFactory]:
+    """Yield what tracks the cameras of a clip that the block makes, and write their poses to files `stem`.*, if any."""
+    if stem is None:
+        follow = TrackedGeometryFactory(every)
+        yield follow
+        follow.finish()
+        return
+    stored = {
+        camera.id: NumberedCamera(camera, number, camera.encoders) for number, camera in enumerate(venue.cameras, 1)
+    }
+    try:
+        with ClipPoses(stem, [*stored.values()], freed_axes) as poses:
+
+            def keep(moment: TrackedMoment, rate: Fraction) -> None:
+                poses.add([_tracked_camera(one, stored[one.camera.id]) for one in moment.cameras], rate)
+
+            follow = TrackedGeometryFactory(every, keep)
+            yield follow
+            follow.finish()
+    except Problem as problem:
+        fail(problem.detail, FAILED)
+
+
+def _print_motions(motions: Mapping[str, MotionSummary]) -> None:
+    """Print the largest turn of each camera and how its pictures were measured."""
+    for camera, motion in motions.items():
+        unseen = motion.how["coasted"], motion.how["refused"]
+        print_note(
+            f"Camera {camera} turned by up to {motion.farthest_deg:.2f} degrees from its first picture; lines measured "
+            f"in {motion.how['measured']} of {motion.how.total()} pictures, not seen or not looked for in {unseen[0]}, "
+            f"not believed in {unseen[1]}"
+        )
+
+
+def _motion_document(motion: MotionSummary) -> dict[str, Any]:
+    """Return a summary of the movement of a camera for JSON."""
+    return {
+        "farthest_deg": round(motion.farthest_deg, 4),
+        **{how: motion.how[how] for how in ("measured", "coasted", "refused")},
+    }
+
+
+def _tracked_camera(followed: TrackedPose, stored: NumberedCamera) -> TrackedCamera:
+    sigma, motion = followed.sigma, followed.motion_sigma
+    return TrackedCamera(
+        replace(stored, camera=posed_camera_to_schema(followed.camera)),
+        followed.how,
+        (sigma.rotation_deg, sigma.position_m),
+        (motion.rotation_deg, motion.position_m),
+    )

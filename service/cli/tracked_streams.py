@@ -105,13 +105,13 @@ class TrackedStreams:
         return frames
 
     def _report(self, pose: "LivePose") -> None:
-        from service.cli.tracked_poses import camera_document
+        from worker.jobs.to_schemas import posed_camera_to_schema
 
         tracked = pose.tracked
         if tracked.how == "measured":
             self._trouble[tracked.camera.id].over(f"camera {tracked.camera.id} is tracked again")
         self._last_s[tracked.camera.id] = time.monotonic()
-        camera = NumberedCamera(camera_document(tracked.camera), self.numbers[tracked.camera.id])
+        camera = NumberedCamera(posed_camera_to_schema(tracked.camera), self.numbers[tracked.camera.id])
         accuracy = Tracked(tracked.sigma.rotation_deg, tracked.sigma.position_m, pose.clock, pose.arrived_ns)
         self.sender.send([camera], pose.at_ns, pose.rate, tracked.how, accuracy)
         self.sent(SentPose(camera.posed, tracked.how, pose.number, pose.at_ns, accuracy))

@@ -7,7 +7,7 @@ from datetime import UTC, datetime, timedelta
 from math import isfinite, isnan
 from typing import Any, Generic, TypeVar
 
-from service.schemas import geometry
+from service.schemas import geometry, venue
 from service.schemas.field import FieldOfPlay
 from service.schemas.geometry import Intrinsics, Moved
 from service.schemas.job import Progress
@@ -33,7 +33,7 @@ from worker.calibration.diagnostics.markings import MarkingReport
 from worker.calibration.gate import quality
 from worker.calibration.gate.displacement import measure_displacement
 from worker.calibration.gate.pairs import Pair
-from worker.calibration.geometry.camera import Pose
+from worker.calibration.geometry.camera import Camera, Pose
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.lens import Lens
 from worker.calibration.refinement import cross_check, uncertainty
@@ -98,6 +98,16 @@ def pose_to_schema(pose: Pose) -> geometry.Pose:
     """Return a pose of the engine for the wire."""
     return geometry.Pose(
         rotation=pose.rotation.tolist(), position=pose.position.tolist(), translation=pose.translation.tolist()
+    )
+
+
+def posed_camera_to_schema(camera: Camera) -> venue.Camera:
+    """Return a camera of the engine for the wire, with the lens of its frames, which may be smaller than stored."""
+    return venue.Camera(
+        id=camera.id,
+        image_size=list(camera.intrinsics.size),
+        intrinsics=lens_to_schema(camera.intrinsics),
+        pose=pose_to_schema(camera.pose),
     )
 
 
