@@ -6,9 +6,9 @@ models are read but fisheyes with a thin prism and EQUIRECTANGULAR. DIVISION, FO
 """
 
 import struct
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import PurePath
-from typing import Any
+from typing import Any, NamedTuple
 
 from service.formats.archive import archive
 from service.formats.lens import RADIAL, TANGENTIAL, NumberedCamera
@@ -42,6 +42,16 @@ MODELS: dict[str, tuple[int, tuple[str, ...] | None]] = {
 }
 COEFFICIENT_ORDER = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
 POINT2D_BYTES = 24
+SizedLens = tuple[Intrinsics, tuple[int, int]]
+
+
+class Image(NamedTuple):
+    """An image of a model, by the number of its camera; `numbers`: quaternion and translation, world to camera."""
+
+    node: Node
+    numbers: list[float]
+    camera: int
+    name: str
 
 
 def write(cameras: Sequence[NumberedCamera]) -> bytes:
@@ -96,8 +106,8 @@ def recognises(file: ParsedFile) -> bool:
 
 def read(files: Sequence[ParsedFile]) -> list[CameraRecord]:
     """Return a camera for each image, or for each of the cameras where the files have no images."""
-    lenses: dict[int, tuple[Intrinsics, tuple[int, int]]] = {}
-    images: list[tuple[Node, list[float], int, str]] = []
+    lenses: dict[int, SizedLens] = {}
+    images: list[Image] = []
     for file in files:
         if file.kind == "binary":
             is_cameras = PurePath(file.name).name == "cameras.bin" or _ends_well(_binary_cameras, file)
@@ -109,23 +119,16 @@ def read(files: Sequence[ParsedFile]) -> list[CameraRecord]:
             images += _text_images(file)
     if not images:
         return [CameraRecord(f"camera-{number}", *lens) for number, lens in lenses.items()]
-    return [_posed(node, numbers, camera, name, lenses) for node, numbers, camera, name in images]
+    return [_posed(image, lenses) for image in images]
 
 
-def _posed(
-    node: Node,
-    numbers: Sequence[float],
-    camera: int,
-    name: str,
-    lenses: dict[int, tuple[Intrinsics, tuple[int, int]]],
-) -> CameraRecord:
-    if camera not in lenses:
-        node.refuse("a camera of cameras.txt or cameras.bin", f"camera {camera}")
-    lens, size = lenses[camera]
-    if not any(numbers[:4]):
-        node.refuse("a quaternion that is not 0")
-    pose = pose_from_translation(vector_of_quaternion(numbers[:4]), list(numbers[4:7]))
-    return CameraRecord(stem_of(name), lens, size, pose)
+def _posed(image: Image, lenses: Mapping[int, SizedLens]) -> CameraRecord:
+    if image.camera not in lenses:
+        image.node.refuse("a camera of cameras.txt or cameras.bin", f"camera {image.camera}")
+    if not any(image.numbers[:4]):
+        image.node.refuse("a quaternion that is not 0")
+    pose = pose_from_translation(vector_of_quaternion(image.numbers[:4]), image.numbers[4:7])
+    return CameraRecord(stem_of(image.name), *lenses[image.camera], pose)
 
 
 def _lens(node: Node, model: str, parameters: Sequence[float], size: tuple[int, int]) -> Intrinsics:
@@ -175,7 +178,7 @@ def _lines(file: ParsedFile) -> Iterator[tuple[Node, str]]:
             yield Node(file.name, f"line {number}", line), line
 
 
-def _text_cameras(file: ParsedFile) -> Iterator[tuple[int, tuple[Intrinsics, tuple[int, int]]]]:
+def _text_cameras(file: ParsedFile) -> Iterator[tuple[int, SizedLens]]:
     for node, line in _lines(file):
         if not line.strip():
             continue
@@ -187,7 +190,7 @@ def _text_cameras(file: ParsedFile) -> Iterator[tuple[int, tuple[Intrinsics, tup
         yield int(number), (_lens(node, words[1], parameters, size), size)
 
 
-def _text_images(file: ParsedFile) -> Iterator[tuple[Node, list[float], int, str]]:
+def _text_images(file: ParsedFile) -> Iterator[Image]:
     lines = _lines(file)
     for node, line in lines:
         if not line.strip():
@@ -196,7 +199,7 @@ def _text_images(file: ParsedFile) -> Iterator[tuple[Node, list[float], int, str
         if len(words) < 10:
             node.refuse("IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME")
         numbers = [_number(node, word) for word in words[1:9]]
-        yield node, numbers[:7], int(numbers[7]), words[9]
+        yield Image(node, numbers[:7], int(numbers[7]), words[9])
         # Its points.
         next(lines, None)
 
@@ -226,7 +229,7 @@ def _unpack(file: ParsedFile, form: str, at: int) -> tuple[Any, ...]:
         ) from None
 
 
-def _binary_cameras(file: ParsedFile) -> Iterator[tuple[int, tuple[Intrinsics, tuple[int, int]]]]:
+def _binary_cameras(file: ParsedFile) -> Iterator[tuple[int, SizedLens]]:
     """Yield the cameras of cameras.bin: id, number of the model, width, height, parameters; little-endian."""
     by_number = {number: (name, parts) for name, (number, parts) in MODELS.items()}
     (count,) = _unpack(file, "<Q", 0)
@@ -242,7 +245,7 @@ def _binary_cameras(file: ParsedFile) -> Iterator[tuple[int, tuple[Intrinsics, t
     _require_end(file, at)
 
 
-def _binary_images(file: ParsedFile) -> Iterator[tuple[Node, list[float], int, str]]:
+def _binary_images(file: ParsedFile) -> Iterator[Image]:
     """Yield the images of images.bin: id, quaternion, translation, camera, name that ends with 0, points."""
     (count,) = _unpack(file, "<Q", 0)
     at = 8
@@ -255,7 +258,7 @@ def _binary_images(file: ParsedFile) -> Iterator[tuple[Node, list[float], int, s
             node.refuse("a name that ends")
         name = file.content[at:end].decode(errors="replace")
         (points,) = _unpack(file, "<Q", end + 1)
-        yield node, numbers, camera, name
+        yield Image(node, numbers, camera, name)
         at = end + 9 + POINT2D_BYTES * points
     _require_end(file, at)
 
