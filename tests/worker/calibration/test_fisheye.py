@@ -10,7 +10,7 @@ from testbed.synthetic import CROWNED, PITCH, moved, paint_frame
 from tests.worker.calibration.outdated_pair import white_on_green
 from worker.calibration.calibrate import calibrate
 from worker.calibration.detection.segmentation import reachable_regions
-from worker.calibration.geometry.camera import Camera, Pose, inside, project, project_planes
+from worker.calibration.geometry.camera import Camera, Pose, inside
 from worker.calibration.geometry.lens import FISHEYE_DISTORTION_LENGTHS, WIDEST_FISHEYE_RAD, Fisheye
 from worker.calibration.geometry.rotation import rotation_angles_deg
 from worker.calibration.geometry.visibility import VisibleLines
@@ -46,62 +46,10 @@ def test_a_ray_ends_where_opencvs_fisheye_puts_it(distortion, angle, turn, lengt
     np.testing.assert_allclose(ours.distort(ray), theirs[0, 0], atol=1e-8)
 
 
-@given(terms, off_axis, st.floats(-np.pi, np.pi))
-def test_the_ray_of_a_rays_pixel_is_that_ray(distortion, angle, turn):
-    ours = lens(distortion)
-    ray = np.tan(angle) * np.array([np.cos(turn), np.sin(turn)])
-    np.testing.assert_allclose(ours.undistort(ours.distort(ray)), ray, atol=1e-7 * (1 + ray @ ray))
-
-
-def test_a_population_is_projected_as_its_members_are_and_as_opencv_projects_them():
-    dome, rng = camera(), np.random.default_rng(2)
-    rotations = dome.pose.rotation + 0.02 * rng.normal(size=(6, 3))
-    positions = dome.pose.position + 0.2 * rng.normal(size=(6, 3))
-    points = rng.uniform([-30, -20, 0], [30, 34, 1], size=(40, 3))
-    together = project(points, rotations, positions, dome.intrinsics)
-    for pixels, rotation, position in zip(together, rotations, positions, strict=True):
-        pose = Pose(rotation, position)
-        theirs, _ = cv2.fisheye.projectPoints(
-            points[:, None], rotation, pose.translation, dome.intrinsics.matrix, dome.intrinsics.distortion
-        )
-        np.testing.assert_allclose(pixels, theirs[:, 0], atol=1e-8)
-
-
-def test_single_precision_is_good_for_a_hundredth_of_a_pixel():
-    dome = camera()
-    points = np.random.default_rng(0).uniform([-52, -34, 0], [52, 34, 0.4], (3000, 3))
-    planes = project_planes(
-        points.T.astype(np.float32), dome.pose.rotation[None], dome.pose.position[None], dome.intrinsics
-    )
-    assert {plane.dtype for plane in planes} == {np.dtype(np.float32)}
-    exact = dome.project(points)
-    seen = inside(exact, SIZE)
-    assert seen.sum() > 1000
-    np.testing.assert_allclose(np.stack(planes, axis=-1)[0][seen], exact[seen], atol=0.01)
-
-
-def test_what_is_beside_or_behind_the_camera_has_no_pixel():
+def test_what_is_beside_the_camera_has_no_pixel():
     wide = lens(focal=300.0)
-    almost = np.tan(WIDEST_FISHEYE_RAD - 1e-4)
-    assert np.isfinite(wide.distort(np.array([almost, 0.0]))).all()
+    assert np.isfinite(wide.distort(np.array([np.tan(WIDEST_FISHEYE_RAD - 1e-4), 0.0]))).all()
     assert np.isnan(wide.distort(np.array([1.1 * np.tan(WIDEST_FISHEYE_RAD), 0.0]))).all()
-    assert np.isnan(camera().project(np.array([[0.0, -80.0, 0.0]]))).all()
-
-
-def test_where_the_model_folds_back_there_is_no_pixel_and_no_ray():
-    # t (1 - 0.2 t²) grows up to t = 1.29.
-    folding = lens([-0.2, 0.0, 0.0, 0.0])
-    assert np.arctan(folding.largest_radius) == pytest.approx(1 / np.sqrt(0.6), abs=1e-3)
-    assert np.isnan(folding.distort(np.array([np.tan(1.35), 0.0]))).all()
-    beyond = folding.matrix[0, 2] + folding.matrix[0, 0] * 0.9
-    assert np.isnan(folding.undistort([beyond, 545.0])).all()
-
-
-def test_a_smaller_copy_of_a_picture_keeps_every_point_in_its_place_and_its_lens():
-    half = lens([0.02, 0, 0, 0]).scaled(0.5)
-    assert isinstance(half, Fisheye)
-    rays = np.array([[0.1, -0.2], [2.0, 0.3]])
-    np.testing.assert_allclose((lens([0.02, 0, 0, 0]).distort(rays) + 0.5) / 2 - 0.5, half.distort(rays))
 
 
 def test_it_sees_the_lines_that_a_pinhole_of_the_same_focal_length_cannot():
@@ -114,18 +62,10 @@ def test_it_sees_the_lines_that_a_pinhole_of_the_same_focal_length_cannot():
 
 
 def test_the_network_looks_where_its_lines_are():
-    regions = reachable_regions(PITCH, camera(), 60.0)
     pixels = camera().project(PITCH.line_points().position)
-    pixels = pixels[inside(pixels, SIZE)]
-    covered = np.zeros(len(pixels), bool)
-    for region in regions:
-        covered |= (
-            (pixels[:, 0] >= region.left)
-            & (pixels[:, 0] < region.right)
-            & (pixels[:, 1] >= region.top)
-            & (pixels[:, 1] < region.bottom)
-        )
-    assert covered.all()
+    x, y = pixels[inside(pixels, SIZE)].T
+    regions = reachable_regions(PITCH, camera(), 60.0)
+    assert np.any([(x >= r.left) & (x < r.right) & (y >= r.top) & (y < r.bottom) for r in regions], axis=0).all()
 
 
 def pair():

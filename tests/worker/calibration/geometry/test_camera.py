@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from worker.calibration.geometry.camera import Camera, Pose, inside, project, project_planes
-from worker.calibration.geometry.lens import DISTORTION_LENGTHS, Intrinsics
+from worker.calibration.geometry.lens import DISTORTION_LENGTHS, Fisheye, Intrinsics
 
 
 def lens(distortion=(), size=(3000, 1800)):
@@ -95,8 +95,16 @@ def test_a_smaller_copy_of_a_picture_has_a_lens_that_is_known_as_well():
     assert replace(lens(), sigma=known).scaled(0.5).sigma == known | {"fx": 2.0, "cy": 1.0}
 
 
-def test_single_precision_is_good_for_a_hundredth_of_a_pixel():
-    camera = Camera("a", lens([-0.34, 0.1, 0.001, -0.002, 0.01]), Pose.looking_at([-1.0, -48.0, 9.0], [-20.0, 0, 0]))
+@pytest.mark.parametrize(
+    "intrinsics",
+    [
+        lens([-0.34, 0.1, 0.001, -0.002, 0.01]),
+        Fisheye(lens().matrix, np.array([-0.02, 0.004, -0.002, 3e-4]), lens().size),
+    ],
+    ids=["pinhole", "fisheye"],
+)
+def test_single_precision_is_good_for_a_hundredth_of_a_pixel(intrinsics):
+    camera = Camera("a", intrinsics, Pose.looking_at([-1.0, -48.0, 9.0], [-20.0, 0, 0]))
     points = np.random.default_rng(0).uniform([-52, -34, 0], [52, 34, 0.4], (3000, 3))
     rotations, positions = camera.pose.rotation[None], camera.pose.position[None]
     planes = project_planes(points.T.astype(np.float32), rotations, positions, camera.intrinsics)
