@@ -111,36 +111,6 @@ def test_nights_add_up_and_go_on_when_the_refined_lens_is_stored(year, stock):
 
 
 @pytest.mark.long
-def test_bad_frames_leave_the_stored_poses_as_they_are_and_each_alarm_sounds_once(year):
-    """Four days of the year below, which is not of every run of the tests.
-
-    A covered camera stands for the frame of another pitch, over which the search for a knocked camera takes its time.
-    """
-    year.pass_(1)
-    assert year.day("a first day", year.frames())
-    year.pass_(25)
-    assert year.told() == [("not-calibrated", None, "began")]
-    others = year.frames()
-    assert not year.day("a covered camera", others | {"right": np.full_like(others["right"], 128)})
-    year.pass_(1)
-    frames = year.frames()
-    assert not year.day("swapped cables", {"left": frames["right"], "right": frames["left"]})
-    # Of the first of the two days the left pose was taken.
-    assert year.told().pop() == ("rejected-in-a-row", "right", "began")
-    year.pass_(1)
-    assert year.day("cables put right", year.frames())
-    # The right camera waited longer than the venue.
-    assert sorted(year.told(), key=str) == [
-        ("not-calibrated", "right", "began"),
-        ("not-calibrated", "right", "ended"),
-        ("not-calibrated", None, "began"),
-        ("not-calibrated", None, "ended"),
-        ("rejected-in-a-row", "right", "began"),
-        ("rejected-in-a-row", "right", "ended"),
-    ]
-
-
-@pytest.mark.long
 @pytest.mark.timeout(900)
 def test_no_bad_pose_holds_on_any_day_of_a_year_and_every_alarm_sounds_once(year, stock):
     year.pass_(1)
