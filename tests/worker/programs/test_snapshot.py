@@ -47,13 +47,6 @@ def camera():
         one.close()
 
 
-@pytest.fixture
-def stranger():
-    stranger = Stranger()
-    yield stranger
-    stranger.close()
-
-
 def taken(tmp_path, url, userinfo):
     document = venue("v", cameras=("left",))
     document["cameras"][0]["source"] = url
@@ -110,11 +103,10 @@ def test_a_user_and_password_that_are_wrong_are_tried_once(camera, tmp_path):
 
 @pytest.mark.parametrize("way", try_first(["digest", "basic"]))
 @pytest.mark.parametrize("method", ["OPTIONS", "DESCRIBE", "SETUP", "PLAY"])
-def test_a_camera_that_leads_elsewhere_is_not_followed_and_its_password_stays_with_it(
-    camera, stranger, tmp_path, method, way
-):
-    seen = camera(way=way, leads={method: f"rtsp://{stranger.host}/live?token=s3cret"})
-    said = refused(tmp_path, f"rtsp://***@{seen.host}/live", RIGHT)
+def test_a_camera_that_leads_elsewhere_is_not_followed_and_its_password_stays_with_it(camera, tmp_path, method, way):
+    with Stranger() as stranger:
+        seen = camera(way=way, leads={method: f"rtsp://{stranger.host}/live?token=s3cret"})
+        said = refused(tmp_path, f"rtsp://***@{seen.host}/live", RIGHT)
     assert f"it answered 302 to {method} and leads to rtsp://{stranger.host}, which is not followed" in said
     assert "s3cret" not in said
     assert stranger.heard == []
