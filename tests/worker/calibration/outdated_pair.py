@@ -6,6 +6,7 @@ import numpy as np
 
 from testbed.synthetic import CROWNED, moved, pair, pair_frames
 from worker.calibration.calibrate import calibrate
+from worker.calibration.geometry.rotation import rotation_angles_deg
 from worker.calibration.records import Options
 
 TURN = (0.006, -0.005, 0.004)
@@ -42,6 +43,13 @@ def in_wind():
 
 def run(cameras=None, pictures=None, **options):
     return calibrate(CROWNED, cameras or outdated(), pictures or frames(), white_on_green, Options(**options))
+
+
+def assert_found(found, truths, within_m=0.03, within_deg=0.05):
+    """Assert that the cameras of a calibration stand where they really do."""
+    for result, truth in zip(found.cameras, truths, strict=True):
+        assert result.camera.distance_m(truth) < within_m
+        assert rotation_angles_deg(result.camera.pose.rotation, truth.pose.rotation) < within_deg
 
 
 @cache

@@ -4,7 +4,7 @@ from functools import cache
 
 import numpy as np
 
-from testbed.synthetic import paint_frame, paint_markings, pair_frames, pair_markings
+from testbed.synthetic import paint_frame, paint_markings, pair, pair_frames, pair_markings
 from worker.calibration.detection.contrast import Channels
 from worker.calibration.refinement.refine import Observations
 
@@ -13,6 +13,11 @@ def observed(pitch, cameras):
     """Observations of the frames that cameras take of a pitch."""
     channels = [Channels([paint_frame(pitch, one)]) for one in cameras]
     return Observations(channels, [paint_markings(pitch, one) for one in cameras])
+
+
+def left_view():
+    """The left camera of the pair, through a lens that does not bend, and the paint in its frame."""
+    return pair(())[0], pair_markings(())[0]
 
 
 @cache

@@ -46,7 +46,7 @@ def test_cameras_are_found_on_one_side_and_a_pair_fits_together(cameras):
     answer, _ = found(*cameras)
     for truth, camera in zip(pair(), answer.cameras, strict=False):
         assert camera.accepted, camera.refusal
-        assert np.linalg.norm(camera.candidates[0].camera.pose.position - truth.pose.position) < 0.03
+        assert camera.candidates[0].camera.distance_m(truth) < 0.03
         assert rotation_angles_deg(camera.candidates[0].camera.pose.rotation, truth.pose.rotation) < 0.05
     assert len(cameras) == 1 or answer.stitch_error_px < 0.2
 
@@ -82,7 +82,7 @@ def test_a_camera_is_found_beside_one_that_is_known():
     (camera,) = found.cameras
     assert camera.accepted
     assert camera.assumed_side is None
-    assert np.linalg.norm(camera.candidates[0].camera.pose.position - right.pose.position) < 0.03
+    assert camera.candidates[0].camera.distance_m(right) < 0.03
 
 
 @pytest.mark.long
@@ -94,7 +94,7 @@ def test_a_camera_on_a_stand_opposite_is_found_there_by_the_ground_that_both_see
     found = find_cameras(PITCH, [sought(left), sought(other)], [], seen, white_on_green, 1)
     for truth, one in zip((left, other), found.cameras, strict=True):
         assert one.accepted, one.refusal
-        assert np.linalg.norm(one.candidates[0].camera.pose.position - truth.pose.position) < 0.05
+        assert one.candidates[0].camera.distance_m(truth) < 0.05
     assert "looks as camera left sees it" in found.cameras[1].remarks[0]
 
 
@@ -104,7 +104,7 @@ def test_the_crown_of_a_field_that_is_given_flat_is_found_with_the_cameras():
     assert found.pitch.ridge_height == pytest.approx(CROWNED.ridge_height, abs=0.02)
     for truth, camera in zip(pair(), found.cameras, strict=True):
         assert camera.accepted, camera.refusal
-        assert np.linalg.norm(camera.candidates[0].camera.pose.position - truth.pose.position) < 0.03
+        assert camera.candidates[0].camera.distance_m(truth) < 0.03
 
 
 @pytest.mark.long

@@ -87,7 +87,7 @@ def test_outdated_poses_of_fisheyes_are_found_again_and_drawn():
     assert found.rejected_because is None
     after = [result.camera for result in found.cameras]
     for truth, camera, result in zip(cameras, after, found.cameras, strict=True):
-        assert np.linalg.norm(camera.pose.position - truth.pose.position) < min(0.1, 2 * result.sigma.position_m)
+        assert camera.distance_m(truth) < min(0.1, 2 * result.sigma.position_m)
         off_deg = rotation_angles_deg(camera.pose.rotation, truth.pose.rotation)
         assert off_deg < min(0.25, 2 * result.sigma.rotation_deg)
     assert found.stitch_error_px < 0.3 < found.stitch_error_before_px

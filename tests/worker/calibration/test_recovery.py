@@ -15,9 +15,10 @@ from tests.worker.calibration.sports import field
 from worker.calibration import recovery
 from worker.calibration.calibrate import calibrate
 from worker.calibration.gate.quality import Refusal
+from worker.calibration.geometry import derivatives
 from worker.calibration.geometry.camera import Camera, Pose
 from worker.calibration.geometry.lens import Intrinsics
-from worker.calibration.geometry.rotation import rotation_angles_deg, rotation_matrices, rotation_vectors
+from worker.calibration.geometry.rotation import rotation_angles_deg
 from worker.calibration.problem import Problem
 from worker.calibration.records import Options, Stopped
 from worker.calibration.relocalisation import candidate
@@ -34,13 +35,13 @@ UPRIGHT = np.array([0.0, 0.0, 1.0])
 
 
 def turned(one, degrees):
-    about_the_pole = rotation_matrices(np.radians(degrees) * UPRIGHT)
-    return one.with_pose(Pose(rotation_vectors(one.pose.matrix @ about_the_pole), one.pose.position))
+    """The camera turned on its pole."""
+    return derivatives.moved(one, np.append(np.radians(degrees) * one.pose.matrix @ UPRIGHT, np.zeros(3)))
 
 
 def rolled(one, degrees):
-    about_the_view = rotation_matrices(np.radians(degrees) * np.array([0.0, 0.0, 1.0]))
-    return one.with_pose(Pose(rotation_vectors(about_the_view @ one.pose.matrix), one.pose.position))
+    """The camera turned about its view."""
+    return derivatives.moved(one, np.array([0, 0, np.radians(degrees), 0, 0, 0]))
 
 
 def knocked_venue():
@@ -88,7 +89,7 @@ def test_a_camera_that_was_turned_on_its_pole_is_found_and_proposed_with_how_far
     assert left.refusal.reason == "knocked"
     assert f"turned by {left.moved.rotation_deg:.1f} degrees" in left.rejected_because
     assert left.moved.rotation_deg == pytest.approx(TURNED_DEG, abs=1.0)
-    assert np.linalg.norm(left.camera.pose.position - truth.pose.position) < 0.05
+    assert left.camera.distance_m(truth) < 0.05
     assert rotation_angles_deg(left.camera.pose.rotation, truth.pose.rotation) < 0.05
     assert proposed().path == "anywhere"
 
@@ -145,7 +146,7 @@ def test_a_proposal_moves_no_other_camera_and_leaves_nothing_to_remember():
     assert right.accepted
     assert set(proposed().memories) == {"right"}
     alone = run(knocked_venue()[1:], {"right": frames()["right"]}, seed=3)
-    apart_m = np.linalg.norm(right.camera.pose.position - alone.cameras[0].camera.pose.position)
+    apart_m = right.camera.distance_m(alone.cameras[0].camera)
     assert apart_m < 0.01
 
 
@@ -281,8 +282,7 @@ def before_a_bright_sky(frame):
 @pytest.mark.long
 def test_a_camera_that_was_knocked_until_its_field_lies_where_the_sky_is_blinded_is_found():
     left = pair()[0]
-    upwards = np.array([np.radians(16.0), 0.0, 0.0])
-    stored = left.with_pose(Pose(rotation_vectors(rotation_matrices(upwards) @ left.pose.matrix), left.pose.position))
+    stored = derivatives.moved(left, np.array([np.radians(16.0), 0, 0, 0, 0, 0]))
     pictures = {"left": (before_a_bright_sky(frames()["left"][0]),)}
     (alone,) = run([stored], pictures, seed=3, recover="never").cameras
     (found,) = run([stored], pictures, seed=3).cameras
@@ -359,10 +359,10 @@ def test_a_camera_that_is_caught_a_line_aside_is_searched_for_and_put_right():
     (aside,) = calibrate(court, [stored], pictures, white_on_green, Options(seed=7, recover="never")).cameras
     assert aside.refusal.reason == "lines"
     assert aside.evidence.agreement > 0.6
-    assert np.linalg.norm(aside.camera.pose.position - truth.pose.position) > 1.0
+    assert aside.camera.distance_m(truth) > 1.0
     (found,) = calibrate(court, [stored], pictures, white_on_green, Options(seed=7)).cameras
     assert found.accepted
-    assert np.linalg.norm(found.camera.pose.position - truth.pose.position) < 0.03
+    assert found.camera.distance_m(truth) < 0.03
 
 
 def test_a_camera_that_was_accepted_stays_where_a_search_finds_no_more_of_its_lines():

@@ -5,11 +5,10 @@ import pytest
 
 from fields.template import load
 from testbed.synthetic import camera, moved
-from tests.worker.calibration.outdated_pair import SHIFT, TURN, white_on_green
+from tests.worker.calibration.outdated_pair import SHIFT, TURN, assert_found, white_on_green
 from tests.worker.calibration.sports import SPORTS, cameras, field, frames
 from worker.calibration.calibrate import calibrate
 from worker.calibration.geometry.field import Field
-from worker.calibration.geometry.rotation import rotation_angles_deg
 from worker.calibration.records import Options
 from worker.calibration.rendering.overlays import overlay
 from worker.calibration.rendering.stitched_pictures import birdseye
@@ -23,9 +22,7 @@ def test_outdated_poses_are_found_again(sport):
     outdated = [moved(c, TURN, SHIFT) for c in cameras(sport)]
     found = calibrate(field(sport), outdated, frames(sport), white_on_green, Options(seed=3))
     assert found.accepted, found.rejected_because
-    for truth, result in zip(cameras(sport), found.cameras, strict=True):
-        assert np.linalg.norm(result.camera.pose.position - truth.pose.position) < 0.03
-        assert rotation_angles_deg(result.camera.pose.rotation, truth.pose.rotation) < 0.05
+    assert_found(found, cameras(sport))
     assert found.stitch_error_px < 0.2
 
 

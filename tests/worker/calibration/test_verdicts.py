@@ -52,10 +52,7 @@ def verdicts(found: Calibration) -> dict[str, bool]:
 
 
 def off_m(found: Calibration, truth: Sequence[Camera]) -> dict[str, float]:
-    return {
-        one.camera.id: float(np.linalg.norm(one.camera.pose.position - true.pose.position))
-        for one, true in zip(found.cameras, truth, strict=True)
-    }
+    return {one.camera.id: one.camera.distance_m(true) for one, true in zip(found.cameras, truth, strict=True)}
 
 
 @pytest.mark.long

@@ -3,7 +3,6 @@
 from dataclasses import replace
 from functools import cache
 
-import numpy as np
 import pytest
 
 from testbed.parameters import try_first
@@ -44,7 +43,7 @@ def calibrated(longer: float, lens_may_drift: bool) -> Calibration:
 
 
 def off_m(found: Calibration) -> float:
-    return float(np.linalg.norm(found.cameras[0].camera.pose.position - plane().pose.position))
+    return found.cameras[0].camera.distance_m(plane())
 
 
 def test_a_lens_that_has_not_changed_is_not_doubted():

@@ -19,13 +19,12 @@ from service.schemas.venue import VenueIn
 from service.settings import MODEL_BESIDE_THE_CODE
 from service.store.jobs.files import drawn_together, picture_file
 from testbed.parameters import try_first
+from testbed.synthetic import moved
+from tests.worker.calibration.gate.good_result import FIGURES, good
 from worker.calibration import records as engine
-from worker.calibration.detection.evidence import Evidence
-from worker.calibration.detection.view_condition import UsualView, ViewCondition, ViewFigures
+from worker.calibration.detection.view_condition import UsualView
 from worker.calibration.diagnostics.markings import MarkingReport
-from worker.calibration.diagnostics.overlap import Overlap
-from worker.calibration.gate.quality import CameraResult, Moved, Refusal
-from worker.calibration.geometry.camera import Pose
+from worker.calibration.gate.quality import Moved, Refusal
 from worker.calibration.memory.camera_memory import CameraMemory, fingerprint
 from worker.calibration.memory.epoch import Epoch
 from worker.calibration.paper import calibrate as paper
@@ -43,7 +42,6 @@ from worker.protocol import Message
 pytestmark = pytest.mark.slow
 
 SIZE = (320, 180)
-FIGURES = ViewFigures(120.0, 1.5, 60.0, 0.8, 0.7, 0.0, 0.0, 0.0, 0.0, 0.1)
 UP_LEFT = [1.675, 0.372, -0.462]
 
 
@@ -82,19 +80,13 @@ def asked(monkeypatch):
         asked.update(pitch=pitch, cameras=cameras, frames=frames, options=options, usual=usual)
         asked.update(memories=memories, taken_at=taken_at)
         report(engine.Progress("evolution", 1.5, 3, float("inf")))
-        evidence = Evidence(np.array([0]), np.array([0]), np.ones(1), np.ones(1, bool), np.full(1, 0.1))
         results = [
-            CameraResult(
-                camera=camera.with_pose(Pose(camera.pose.rotation, camera.pose.position + [0.05, 0, 0])),
-                evidence=evidence,
+            replace(
+                good(),
+                camera=moved(camera, by=(0.05, 0.0, 0.0)),
                 residual_px=None,
                 covariance=np.diag([np.inf] * 3 + [0.1] * 3),
                 repeatability=Sigma(0.01, 0.02),
-                zoom=None,
-                with_fitted_zoom=None,
-                view=ViewCondition(True, None, None, "The field can be seen.", FIGURES),
-                overlap=Overlap(0.9, 0.95, 0.05),
-                evidence_before=lambda: evidence,
                 moved=Moved(0.0, 0.05, float("nan")),
                 refusal=Refusal(asked.get("reason", "view"), asked["against"][camera.id])
                 if camera.id in asked["against"]
@@ -149,7 +141,7 @@ def test_what_the_last_accepted_job_saw_reaches_the_engine(venue, files, asked, 
     last = {"left": View(usable=True, detail="", lines_found=0.9)}
     outcome = solve(venue, files, Options(seed=7), means, lambda _: None, NightHistory(last))
     assert asked["usual"] == {"left": UsualView(0.9, None)}
-    assert outcome.result.cameras[0].view.lines_found == 0.8
+    assert outcome.result.cameras[0].view.lines_found == FIGURES.lines_found
 
 
 def test_the_engine_gets_the_venue_and_the_frames(venue, files, asked, means):

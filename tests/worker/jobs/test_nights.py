@@ -8,10 +8,7 @@ import pytest
 
 from service.schemas.lens_limits import BOARD_FOCAL_PERCENT
 from testbed.synthetic import TAPED
-from worker.calibration.detection.evidence import Evidence
-from worker.calibration.detection.view_condition import ViewCondition, ViewFigures
-from worker.calibration.diagnostics.overlap import Overlap
-from worker.calibration.gate.quality import CameraResult, Moved
+from tests.worker.calibration.gate.good_result import good
 from worker.calibration.geometry.camera import Camera, Pose
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.lens import Intrinsics
@@ -23,26 +20,12 @@ PITCH = Field(105.0, 68.0, sigma=TAPED)
 LENS = Intrinsics(np.array([[2000.0, 0, 1920], [0, 2000, 1080], [0, 0, 1]]), np.zeros(4), (3840, 2160), {"fx": 5.0})
 CAMERA = Camera("left", LENS, Pose.looking_at([0.0, -50.0, 10.0], [0.0, 0.0, 0.0]))
 NOVEMBER, TONIGHT = (datetime(2026, 11, day, 2, tzinfo=UTC) for day in (3, 23))
-FIGURES = ViewFigures(120.0, 1.5, 60.0, 0.8, 0.7, 0.0, 0.0, 0.0, 0.0, 0.1)
 
 
 @pytest.fixture
 def found():
     """A camera as the engine answers it, without a refined pose."""
-    seen = Evidence(np.array([0]), np.array([0]), np.ones(1), np.ones(1, bool), np.full(1, 0.1))
-    return CameraResult(
-        CAMERA,
-        seen,
-        1.0,
-        None,
-        None,
-        None,
-        None,
-        ViewCondition(True, None, None, "", FIGURES),
-        Overlap(0.9, 0.95, 0.05),
-        seen,
-        Moved(0.0, 0.0, 0.0),
-    )
+    return replace(good(), camera=CAMERA)
 
 
 def test_a_refined_camera_is_told_with_its_covariance_and_with_what_differs(found):

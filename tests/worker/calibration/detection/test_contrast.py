@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from fields.shapes import COLOURS
-from testbed.synthetic import CROWNED, pair, pair_markings
+from testbed.synthetic import CROWNED
+from tests.worker.calibration.sights import left_view
 from worker.calibration.detection.contrast import Channel, Channels, possible_signs
 from worker.calibration.detection.evidence import evidence_of
 from worker.calibration.detection.frame_fusion import Sway
@@ -28,10 +29,6 @@ PAINTS = {
 BESIDE_PX = 9
 
 
-def scene():
-    return pair(())[0], pair_markings(())[0]
-
-
 def lines(colour):
     """All markings of the pitch, as if they were painted in one colour."""
     white = CROWNED.line_points()
@@ -40,13 +37,13 @@ def lines(colour):
 
 @cache
 def grain():
-    _, share = scene()
+    _, share = left_view()
     return np.random.default_rng(1).normal(0, 3, (*share.shape, 3)).astype(np.float32)
 
 
 def painted(ground, *layers):
     """Grain, and lines of several colours: (colour, how many columns aside)."""
-    _, share = scene()
+    _, share = left_view()
     picture = np.array(ground, np.float32) + grain()
     for colour, aside in layers:
         there = np.roll(share, aside, axis=1)[..., None]
@@ -55,7 +52,7 @@ def painted(ground, *layers):
 
 
 def agreement(colour, channels):
-    one, share = scene()
+    one, share = left_view()
     return evidence_of(lines(colour), one, channels, np.zeros_like(share)).agreement
 
 
@@ -83,7 +80,7 @@ def test_lines_of_another_colour_are_not_the_marking(said, there):
 
 
 def test_a_white_line_beside_a_blue_one_does_not_pull_it():
-    one, share = scene()
+    one, share = left_view()
     both = painted(WOOD, ("blue", 0), ("white", BESIDE_PX))
     found = measure_lines(lines("blue"), one, both, np.zeros_like(share), 14.0)
     # Along the rows the two lie on each other.
@@ -100,7 +97,7 @@ def test_white_says_nothing_and_every_other_colour_something():
 
 
 def contrasts_of_most(colour, ground):
-    one, _ = scene()
+    one, _ = left_view()
     seen = VisibleLines.from_camera(lines(colour), one)
     contrasts = known_contrasts(seen, painted(ground, (colour, 0)), 3.0, 1.0)[np.unique(seen.points.marking)]
     each, counts = np.unique(contrasts, axis=0, return_counts=True)
@@ -118,7 +115,7 @@ def test_video_is_read_in_the_channel_in_which_lines_stand_out_where_luma_does_n
 
 
 def test_lines_of_known_contrasts_are_measured_as_they_are_where_these_are_looked_for():
-    one, share = scene()
+    one, share = left_view()
     points, channels = lines("white"), painted(TURF, ("white", 0))
     contrasts = known_contrasts(VisibleLines.from_camera(points, one), channels, 3.0, 1.0)
     known = LineProfiles.read_known(points, one, channels, contrasts, 3.0).measure(one, points, 3.0)

@@ -3,20 +3,17 @@
 import numpy as np
 import pytest
 
-from testbed.synthetic import CROWNED, moved, pair, pair_markings
+from testbed.synthetic import CROWNED, moved
+from tests.worker.calibration.sights import left_view
 from worker.calibration.detection.contrast import Channels
 from worker.calibration.detection.evidence import Evidence, evidence_of
 
 Colour = float | tuple[float, float, float]
 
 
-def scene():
-    return pair(())[0], pair_markings(())[0]
-
-
 def frame(level: Colour, paint: Colour, noise: float = 3.0) -> np.ndarray:
     """Lines of one colour (blue, green, red) on a floor of another, with the sensor's noise."""
-    _, share = scene()
+    _, share = left_view()
     grain = np.random.default_rng(1).normal(0, noise, (*share.shape, 3))
     ground, lines = (np.broadcast_to(np.asarray(colour, float), 3) for colour in (level, paint))
     return np.clip(ground + (lines - ground) * share[..., None] + grain, 0, 255).astype(np.uint8)
@@ -27,17 +24,17 @@ def floor(level: Colour, paint: Colour, noise: float = 3.0) -> Channels:
 
 
 def blind() -> np.ndarray:
-    return np.zeros_like(scene()[1])
+    return np.zeros_like(left_view()[1])
 
 
 def test_lines_are_seen_where_the_true_pose_puts_them():
-    one, paint = scene()
+    one, paint = left_view()
     seen = evidence_of(CROWNED.line_points(), one, floor(90, 200), paint)
     assert seen.agreement > 0.9
 
 
 def test_a_wrong_pose_finds_hardly_more_than_chance():
-    one, paint = scene()
+    one, paint = left_view()
     seen = evidence_of(CROWNED.line_points(), moved(one, (0.03, 0.02, 0)), floor(90, 200), paint)
     assert seen.agreement < 0.3
 
@@ -48,30 +45,30 @@ def test_a_wrong_pose_finds_hardly_more_than_chance():
     ids=["white on grey", "black on light", "blue on wood", "orange on turf"],
 )
 def test_a_ridge_alone_is_witness_enough(level, paint):
-    one, _ = scene()
+    one, _ = left_view()
     assert evidence_of(CROWNED.line_points(), one, floor(level, paint), blind()).agreement > 0.85
 
 
 def test_the_network_alone_is_witness_enough():
-    one, paint = scene()
+    one, paint = left_view()
     assert evidence_of(CROWNED.line_points(), one, floor(90, 90), paint).agreement > 0.8
 
 
 def test_noise_shows_no_lines():
-    one, _ = scene()
+    one, _ = left_view()
     seen = evidence_of(CROWNED.line_points(), one, floor(90, 90, noise=20), blind())
     assert abs(seen.agreement) < 0.15
     assert len(seen.seen()) <= 1
 
 
 def test_a_bright_picture_without_lines_is_no_evidence():
-    one, _ = scene()
+    one, _ = left_view()
     everywhere = np.ones_like(blind())
     assert evidence_of(CROWNED.line_points(), one, floor(90, 90), everywhere).agreement < 0.1
 
 
 def test_a_marking_that_is_not_there_is_not_seen():
-    one, _ = scene()
+    one, _ = left_view()
     names = [marking.name for marking in CROWNED.markings()]
     picture = frame(90, 200)
     lines = CROWNED.line_points()

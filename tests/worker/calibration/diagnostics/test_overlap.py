@@ -3,50 +3,47 @@
 import numpy as np
 import pytest
 
-from testbed.synthetic import CROWNED, moved, pair, pair_markings
+from testbed.synthetic import CROWNED, moved
+from tests.worker.calibration.sights import left_view
 from worker.calibration.diagnostics.overlap import overlap_of
 
 
-def scene():
-    return pair(())[0], pair_markings(())[0]
-
-
 def test_the_true_pose_explains_the_markings():
-    one, response = scene()
+    one, response = left_view()
     assert overlap_of(CROWNED, one, response).iou > 0.7
 
 
 def test_a_moved_pose_explains_fewer():
-    one, response = scene()
+    one, response = left_view()
     assert overlap_of(CROWNED, moved(one, (0.02, 0, 0)), response).iou < 0.4
 
 
 def test_markings_beside_the_expected_ones_count_against_a_pose():
-    one, response = scene()
+    one, response = left_view()
     cluttered = response.copy()
     cluttered[300:330:4, 200:700] = 1
     assert overlap_of(CROWNED, one, cluttered).iou < overlap_of(CROWNED, one, response).iou
 
 
 def test_what_is_off_the_pitch_does_not_count():
-    one, response = scene()
+    one, response = left_view()
     lettering = response.copy()
     lettering[:60] = 1  # sky
     assert overlap_of(CROWNED, one, lettering).iou == pytest.approx(overlap_of(CROWNED, one, response).iou)
 
 
 def test_a_black_segmentation_explains_nothing():
-    one, response = scene()
+    one, response = left_view()
     assert overlap_of(CROWNED, one, np.zeros_like(response)).iou == 0
 
 
 def test_a_pose_that_sees_no_pitch_explains_nothing():
-    one, response = scene()
+    one, response = left_view()
     assert overlap_of(CROWNED, moved(one, (2.0, 0, 0)), response).iou == 0
 
 
 def test_the_two_sides_of_the_overlap_tell_missing_lines_from_other_lines():
-    one, response = scene()
+    one, response = left_view()
     clean = overlap_of(CROWNED, one, response)
     assert clean.found > 0.9
     assert clean.unexpected < 0.1

@@ -23,9 +23,9 @@ from worker.calibration.diagnostics.registration import (
     register_pair,
     shares_plenty,
 )
-from worker.calibration.geometry.camera import Array, Camera, Pose
+from worker.calibration.geometry import derivatives
+from worker.calibration.geometry.camera import Array, Camera
 from worker.calibration.geometry.field import Field
-from worker.calibration.geometry.rotation import rotation_matrices, rotation_vectors
 
 pytestmark = pytest.mark.slow
 
@@ -185,8 +185,7 @@ def test_the_number_of_threads_changes_no_digit() -> None:
 @pytest.mark.parametrize("degrees", try_first([6.0, -6.0]))
 def test_a_halfway_line_that_has_slid_along_itself_is_no_registration(degrees: float) -> None:
     # The circles are tens of metres apart, and the halfway line fits itself wherever it is.
-    turn = rotation_matrices(np.radians([degrees, 0.0, 0.0]))
-    pitched = RIGHT.with_pose(Pose(rotation_vectors(turn @ RIGHT.pose.matrix), RIGHT.pose.position))
+    pitched = derivatives.moved(RIGHT, np.array([np.radians(degrees), 0, 0, 0, 0, 0]))
     assert register_pair(PITCH, LEFT, pitched, mask_of("left", False), mask_of("right", False)) is None
     assert shares_plenty(PITCH, LEFT, pitched)
 

@@ -74,7 +74,7 @@ def test_a_pitch_that_is_shorter_narrower_and_flatter_than_said_is_found():
     assert (found.length, found.width) == (measures["length_m"].value, measures["width_m"].value)
     assert found.ridge_height == pytest.approx(0.35, abs=0.03)
     for before, after in zip(pair(), refined.cameras, strict=True):
-        assert np.linalg.norm(before.pose.position - after.pose.position) < 0.1
+        assert before.distance_m(after) < 0.1
 
 
 @pytest.mark.long

@@ -15,7 +15,7 @@ LEFT = pair(())[0]
 
 
 def seen(share: float, by_chance: float = 0.2) -> Evidence:
-    """That much of a hundred pieces of one line."""
+    """That much of a hundred pieces of one line is found."""
     pieces = np.arange(100)
     found = pieces < 100 * share
     return Evidence(pieces, np.zeros(100, int), np.ones(100), found, np.full(100, by_chance))

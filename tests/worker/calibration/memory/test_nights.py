@@ -1,6 +1,5 @@
 """Sequences of nights, each of which begins where the last one ended: none makes the engine confidently wrong."""
 
-import numpy as np
 import pytest
 
 from testbed.parameters import try_first
@@ -12,12 +11,8 @@ pytestmark = pytest.mark.slow
 FARTHEST_M, SIGMAS = 0.3, 3.0
 
 
-def off_m(camera, real):
-    return float(np.linalg.norm(camera.pose.position - real.pose.position))
-
-
 def wrong(result, real):
-    off = off_m(result.camera, real)
+    off = result.camera.distance_m(real)
     return result.accepted and (off > max(SIGMAS * result.sigma.position_m, 0.005) or off > FARTHEST_M)
 
 
@@ -43,14 +38,14 @@ def test_a_lens_that_creeps_by_half_a_thousandth_a_night_never_takes_the_pose_wi
     done = nights_of(lambda night: 0.0005 * night, 18)
     assert not any(wrong(*one) for one in done)
     named = next(n for n, (result, _) in enumerate(done) if result.lens_change and result.lens_change.notable)
-    assert max(off_m(result.camera, real) for result, real in done[:named]) < 0.1
+    assert max(result.camera.distance_m(real) for result, real in done[:named]) < 0.1
     for result, real in done[ANCHOR_JOBS:]:
         if result.accepted:
-            assert off_m(result.refined.camera, real) < 3 * result.refined.sigma.position_m
+            assert result.refined.camera.distance_m(real) < 3 * result.refined.sigma.position_m
 
 
 @pytest.mark.long
 def test_the_refined_pose_is_nearer_than_the_one_for_a_lens_that_is_off():
     done = nights_of(lambda _: 0.002, 3)
     for result, real in done:
-        assert off_m(result.refined.camera, real) < 0.5 * off_m(result.camera, real)
+        assert result.refined.camera.distance_m(real) < 0.5 * result.camera.distance_m(real)

@@ -63,7 +63,7 @@ def through_a_wrong_lens():
 def off_by(cameras, refined):
     return [
         (
-            np.linalg.norm(after.pose.position - before.pose.position),
+            after.distance_m(before),
             rotation_angles_deg(after.pose.rotation, before.pose.rotation),
         )
         for before, after in zip(cameras, refined, strict=True)
@@ -226,7 +226,7 @@ def test_a_lone_touchline_neither_lets_a_camera_run_away_nor_makes_it_sure(disto
     one = lone_line(distortion)
     refined = refine(CROWNED, [moved(one, by=(0.2, 0.0, 0.0))], observed(CROWNED, [one]), 0.5)
     assert refined.each[0].residual_px is not None
-    assert np.linalg.norm(refined.cameras[0].pose.position - one.pose.position) < 1.5
+    assert refined.cameras[0].distance_m(one) < 1.5
     assert refined.each[0].sigma.position_m > GATE.largest_ground_sigma_m
 
 
@@ -280,7 +280,7 @@ def test_a_focal_length_that_is_left_free_is_found_with_the_pose():
     found = refine(CROWNED, start, pair_observed(), 0.5, free_focal_lengths(start))
     for true, after in zip(cameras, found.cameras, strict=True):
         assert after.intrinsics.matrix[0, 0] == pytest.approx(true.intrinsics.matrix[0, 0], abs=0.2)
-        assert np.linalg.norm(after.pose.position - true.pose.position) < 0.02
+        assert after.distance_m(true) < 0.02
     assert found.pitch is CROWNED
 
 

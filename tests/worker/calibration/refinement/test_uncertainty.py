@@ -130,12 +130,12 @@ def test_a_pose_that_was_found_through_a_lens_is_no_witness_of_that_lens(too_lon
         (said,) = estimate_uncertainty(here, [there], [memory], [found], [NO_EVIDENCE], unknowns).each
         job = AcceptedJob(there, found, lines, None, frames=str(night))
         memory = CameraMemory.from_first_job(there, job) if memory is None else memory.after(job)
-    away_m = np.linalg.norm(there.pose.position - real.pose.position)
+    away_m = there.distance_m(real)
     assert away_m > 0.05
     assert said.sigma.position_m > away_m / 3
     # It is no zoom: the lens was as wrong when the pose was stored.
     assert abs(said.zoom.value) < 3 * said.zoom.sigma
-    assert np.linalg.norm(said.refined.camera.pose.position - real.pose.position) < 0.2 * away_m
+    assert said.refined.camera.distance_m(real) < 0.2 * away_m
     # Where pixels are on the ground is known far better than where the camera stands.
     assert np.quantile(said.ground_sigma.metres, 0.95) < 0.5 * said.sigma.position_m
 
@@ -153,4 +153,4 @@ def test_nights_through_another_lens_say_of_tonights_what_they_said_of_theirs():
         here = gauss_newton_step(here, [given], [found], unknowns, huber_weights).to
     (said,) = estimate_uncertainty(here, [given], [memory], [found], [NO_EVIDENCE], unknowns).each
     assert said.refined.camera.intrinsics.focal_length_px == pytest.approx(1000.0, abs=1.0)
-    assert np.linalg.norm(said.refined.camera.pose.position - real.pose.position) < 0.05
+    assert said.refined.camera.distance_m(real) < 0.05

@@ -53,9 +53,9 @@ def test_what_is_off_is_named_and_the_sigma_covers_the_error(displaced, name, by
     (suspicion,) = find_suspicions(said.deviations)
     assert suspicion.quantity == name
     assert suspicion.deviation == pytest.approx(by_m, abs=3 * suspicion.sigma)
-    away_m = np.linalg.norm(found.camera.pose.position - real.pose.position)
+    away_m = found.camera.distance_m(real)
     assert 0.05 < away_m < 3 * found.sigma.position_m
-    refined_away_m = np.linalg.norm(found.refined.camera.pose.position - real.pose.position)
+    refined_away_m = found.refined.camera.distance_m(real)
     assert refined_away_m < 3 * found.refined.sigma.position_m
     assert refined_away_m < away_m / 2
 
@@ -73,7 +73,7 @@ def test_where_one_box_is_seen_the_pose_is_as_sure_as_the_field_is_said_to_be():
     sigmas_m = []
     for known_m in (0.03, 0.5):
         real, said = found_on(aside, replace(PITCH, sigma={"length_m": known_m}), BOX)
-        away_m = np.linalg.norm(said.each[0].camera.pose.position - real.pose.position)
+        away_m = said.each[0].camera.distance_m(real)
         assert away_m == pytest.approx(0.25, abs=0.05)
         sigmas_m.append(said.each[0].sigma.position_m)
     assert sigmas_m[0] < away_m / 3
@@ -83,7 +83,7 @@ def test_where_one_box_is_seen_the_pose_is_as_sure_as_the_field_is_said_to_be():
 def test_a_field_that_is_as_it_is_said_to_be_is_doubted_in_nothing():
     real, said = found_on(lambda lines: np.zeros((len(lines), 3)))
     assert find_suspicions(said.deviations) == []
-    assert np.linalg.norm(said.each[0].camera.pose.position - real.pose.position) < 0.05
+    assert said.each[0].camera.distance_m(real) < 0.05
 
 
 def test_how_far_out_of_square_a_field_is_cannot_be_written_into_it():

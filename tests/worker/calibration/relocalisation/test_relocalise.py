@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from testbed.synthetic import BARREL, PITCH, camera, paint_frame
+from tests.worker.calibration.gate.good_result import seen
 from tests.worker.calibration.outdated_pair import white_on_green
 from tests.worker.calibration.sports import field
 from worker.calibration.detection.contrast import Channels
-from worker.calibration.detection.evidence import Evidence
 from worker.calibration.detection.segmentation import Region
 from worker.calibration.diagnostics.overlap import Overlap
 from worker.calibration.geometry.camera import inside
@@ -161,12 +161,10 @@ def test_two_parallel_lines_are_no_field():
 
 def candidate(found_of_100, explained_of_100, iou, residual_px=0.4):
     """What is seen of 100 pieces of expected line, and which of 100 places on paint lie on one."""
-    seen = Evidence(np.arange(100), np.zeros(100, int), np.ones(100), np.arange(100) < found_of_100, np.zeros(100))
-    explains = np.isin(np.arange(100), explained_of_100)
-    agreement = 2 / (1 / seen.agreement + 1 / explains.mean())
-    return Candidate(
-        SIDELINE, agreement, explains, seen, Overlap(iou, found_of_100 / 100, 0.0), residual_px, None, None
-    )
+    evidence, explains = seen(found_of_100 / 100, by_chance=0.0), np.isin(np.arange(100), explained_of_100)
+    agreement = 2 / (1 / evidence.agreement + 1 / explains.mean())
+    overlap = Overlap(iou, found_of_100 / 100, 0.0)
+    return Candidate(SIDELINE, agreement, explains, evidence, overlap, residual_px, None, None)
 
 
 def test_of_two_poses_that_agree_alike_the_one_closer_to_its_lines_is_better_and_else_the_one_that_agrees_more():

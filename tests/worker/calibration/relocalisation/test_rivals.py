@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from testbed.synthetic import PITCH, camera, moved, paint_frame, pair, worn
-from worker.calibration.detection.evidence import Evidence
+from tests.worker.calibration.gate.good_result import seen
 from worker.calibration.diagnostics.overlap import Overlap
 from worker.calibration.refinement.uncertainty import Sigma
 from worker.calibration.relocalisation.candidate import Candidate
@@ -25,9 +25,8 @@ NOT_UNIQUE = NotFound("not-unique", "two poses explain the lines")
 
 
 def candidate(one, found_of_100=95):
-    seen = Evidence(np.arange(100), np.zeros(100, int), np.ones(100), np.arange(100) < found_of_100, np.zeros(100))
-    overlap = Overlap(0.8, found_of_100 / 100, 0.0)
-    return Candidate(one, 0.9, np.ones(100, bool), seen, overlap, 0.3, Sigma(0.01, 0.01), 0.1)
+    evidence, overlap = seen(found_of_100 / 100, by_chance=0.0), Overlap(0.8, found_of_100 / 100, 0.0)
+    return Candidate(one, 0.9, np.ones(100, bool), evidence, overlap, 0.3, Sigma(0.01, 0.01), 0.1)
 
 
 def slid(one, by_m=18.0):

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from testbed.synthetic import CROWNED, PITCH, pair
-from worker.calibration.geometry.camera import Pose
-from worker.calibration.geometry.rotation import rotation_matrices, rotation_vectors
+from worker.calibration.geometry.derivatives import moved
 from worker.calibration.stitching.views import LevelView, ViewChoice, chosen_view
 
 CAMERAS = pair()
@@ -81,19 +80,9 @@ def test_a_view_has_the_size_that_is_wanted_and_an_even_height_where_none_is(pro
 
 
 def test_a_night_of_wind_does_not_move_the_view():
-    moved = [
-        camera.with_pose(
-            Pose(
-                rotation_vectors(rotation_matrices(np.radians([0.01, -0.02, 0.01])) @ camera.pose.matrix),
-                camera.pose.position + [0.004, -0.003, 0.002],
-            )
-        )
-        for camera in CAMERAS
-    ]
-    choice = ViewChoice("pannini", 1920)
-    assert chosen_view(PITCH, moved, choice).size == chosen_view(PITCH, CAMERAS, choice).size
+    wind = np.append(np.radians([0.01, -0.02, 0.01]), [0.004, -0.003, 0.002])
+    swayed = [moved(camera, wind) for camera in CAMERAS]
+    before, after = (chosen_view(PITCH, cameras, ViewChoice("pannini", 1920)) for cameras in (CAMERAS, swayed))
+    assert after.size == before.size
     goal = np.array([30.0, 10.0, 0.0])
-    assert (
-        chosen_view(PITCH, moved, choice).project(goal).tolist()
-        == chosen_view(PITCH, CAMERAS, choice).project(goal).tolist()
-    )
+    assert after.project(goal).tolist() == before.project(goal).tolist()
