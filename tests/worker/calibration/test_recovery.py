@@ -291,33 +291,26 @@ def test_a_camera_that_was_knocked_until_its_field_lies_where_the_sky_is_blinded
     assert rotation_angles_deg(found.camera.pose.rotation, left.pose.rotation) < 0.1
 
 
-@pytest.mark.parametrize(("lit_rows", "is_doubted"), [(40, False), (80, True)])
-def test_of_a_camera_in_the_dark_it_is_asked_whether_a_third_of_its_frame_is_light_enough_for_lines(
-    lit_rows, is_doubted
-):
-    frame = np.full((200, 320, 3), 8, np.uint8)
-    frame[-lit_rows:] = 17
+@pytest.mark.parametrize(
+    ("brightness", "noise", "lit_rows", "is_doubted"),
+    [
+        # Noise does not hide what lies in the dark, or it does, or there is nothing.
+        (8, 1.0, 0, True),
+        (8, 6.0, 0, False),
+        (2, 0.0, 0, False),
+        # A third of the frame is light enough for lines.
+        (8, 6.0, 40, False),
+        (8, 6.0, 80, True),
+    ],
+)
+def test_a_camera_in_the_dark_is_looked_for_where_its_lines_could_be_seen(brightness, noise, lit_rows, is_doubted):
+    frame = np.full((200, 320, 3), brightness, np.uint8)
+    frame[len(frame) - lit_rows :] = 17
+    view = SimpleNamespace(cause="dark", figures=SimpleNamespace(brightness=float(brightness), noise=noise))
     problem = SimpleNamespace(
-        cameras=[camera("left", (0.0, -40.0, 8.0), (0.0, 0.0))],
-        observed=SimpleNamespace(views=[noisy("dark", brightness=8.0, noise=6.0)]),
+        cameras=[camera("left", (0.0, -40.0, 8.0), (0.0, 0.0))], observed=SimpleNamespace(views=[view])
     )
     observer = SimpleNamespace(frames={"left": (frame,)})
-    assert recovery._refusal_may_concern_wrong_region(problem, 0, observer) == is_doubted
-
-
-def noisy(cause, brightness, noise):
-    return SimpleNamespace(cause=cause, figures=SimpleNamespace(brightness=brightness, noise=noise))
-
-
-@pytest.mark.parametrize(
-    ("brightness", "noise", "is_doubted"), [(8.0, 1.0, True), (8.0, 6.0, False), (2.0, 0.0, False)]
-)
-def test_what_lies_in_the_dark_is_looked_for_where_noise_does_not_hide_it(brightness, noise, is_doubted):
-    problem = SimpleNamespace(
-        cameras=[camera("left", (0.0, -40.0, 8.0), (0.0, 0.0))],
-        observed=SimpleNamespace(views=[noisy("dark", brightness, noise)]),
-    )
-    observer = SimpleNamespace(frames={"left": (np.full((200, 320, 3), int(brightness), np.uint8),)})
     assert recovery._refusal_may_concern_wrong_region(problem, 0, observer) == is_doubted
 
 

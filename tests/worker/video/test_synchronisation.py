@@ -58,31 +58,21 @@ def test_lamps_that_flicker_are_not_taken_for_motion(left, tmp_path):
     assert estimate_offset(left, motion("right", path)).second_s == pytest.approx(0.2, abs=0.01)
 
 
-@pytest.mark.long
-def test_an_empty_pitch_tells_nothing(left, tmp_path):
-    still = motion("right", film(tmp_path / "r.mp4", RIGHT, 4.0, moving=False))
-    found = estimate_offset(left, still)
-    assert found.second_s is None
-    assert "nothing moves" in found.why
-
-
-@pytest.mark.long
-def test_clips_of_different_minutes_are_not_put_together(left, tmp_path):
-    other = motion("right", film(tmp_path / "r.mp4", RIGHT, 6.0, begun_s=40))
-    found = estimate_offset(left, other)
+@pytest.mark.parametrize(
+    ("seconds", "filmed", "why"),
+    [
+        (1.0, {}, "shorter than 2 s"),
+        pytest.param(4.0, {"moving": False}, "nothing moves", marks=pytest.mark.long),
+        # Of different minutes, and too far apart.
+        pytest.param(6.0, {"begun_s": 40}, "", marks=pytest.mark.long),
+        pytest.param(6.0, {"begun_s": 3}, "", marks=pytest.mark.long),
+    ],
+)
+def test_clips_that_tell_nothing_are_not_put_together(left, tmp_path, seconds, filmed, why):
+    found = estimate_offset(left, motion("right", film(tmp_path / "r.mp4", RIGHT, seconds, **filmed)))
     assert found.second_s is None
     assert found.why
-
-
-@pytest.mark.long
-def test_clips_too_far_apart_are_not_put_together(left, tmp_path):
-    assert estimate_offset(left, motion("right", film(tmp_path / "r.mp4", RIGHT, 6.0, begun_s=3))).second_s is None
-
-
-def test_an_instant_tells_nothing(left, tmp_path):
-    found = estimate_offset(left, motion("right", film(tmp_path / "r.mp4", RIGHT, 1.0)))
-    assert found.second_s is None
-    assert "shorter than 2 s" in found.why
+    assert why in found.why
 
 
 @pytest.mark.long

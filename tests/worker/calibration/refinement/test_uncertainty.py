@@ -113,44 +113,46 @@ def test_the_sigma_of_a_lens_that_lines_found_is_not_counted_beside_those_lines(
     assert said_of_a_corner("lines", **known) == said_of_a_corner("lines", fx=0.1)
 
 
+PITCH = Field(105.0, 68.0, 0.12, template=load("football"))
+LINES = PITCH.line_points()
+UNKNOWNS = Unknowns(1, [], Ground.under(LINES))
+REAL = camera("left", (0.0, -45.0, 14.0), (0.0, 0.0), focal=1000.0, size=(1280, 720))
+SEEN = replace(measured(LINES, REAL), misfit_px=0.2)
+
+
+def refined_through_lens(longer_px):
+    """Where what the real camera sees puts one whose focal length is longer."""
+    given = with_focal_length(REAL, longer_px)
+    here = replace(Estimate.initial(PITCH, [given], UNKNOWNS), uneven_m=EVEN_M)
+    for _ in range(12):
+        here = gauss_newton_step(here, [given], [SEEN], UNKNOWNS, huber_weights).to
+    return here
+
+
 @pytest.mark.parametrize("too_long", try_first([0.01, 0.003, 0.02]))
 @pytest.mark.parametrize("nights", try_first([4, 1]))
 def test_a_pose_that_was_found_through_a_lens_is_no_witness_of_that_lens(too_long, nights):
     """Nothing but the lens is off: the camera stands where it was found, night after night."""
-    pitch = Field(105.0, 68.0, 0.12, template=load("football"))
-    real = camera("left", (0.0, -45.0, 14.0), (0.0, 0.0), focal=1000.0, size=(1280, 720))
-    given = with_focal_length(real, too_long * 1000.0)
-    lines, unknowns = pitch.line_points(), Unknowns(1, [], Ground.under(pitch.line_points()))
-    found = replace(measured(lines, real), misfit_px=0.2)
-    here = replace(Estimate.initial(pitch, [given], unknowns), uneven_m=EVEN_M)
-    for _ in range(12):
-        here = gauss_newton_step(here, [given], [found], unknowns, huber_weights).to
-    (there,), memory = here.cameras, None
+    here, memory = refined_through_lens(too_long * 1000.0), None
+    (there,) = here.cameras
     for night in range(nights):
-        (said,) = estimate_uncertainty(here, [there], [memory], [found], [NO_EVIDENCE], unknowns).each
-        job = AcceptedJob(there, found, lines, None, frames=str(night))
+        (said,) = estimate_uncertainty(here, [there], [memory], [SEEN], [NO_EVIDENCE], UNKNOWNS).each
+        job = AcceptedJob(there, SEEN, LINES, None, frames=str(night))
         memory = CameraMemory.from_first_job(there, job) if memory is None else memory.after(job)
-    away_m = there.distance_m(real)
+    away_m = there.distance_m(REAL)
     assert away_m > 0.05
     assert said.sigma.position_m > away_m / 3
     # It is no zoom: the lens was as wrong when the pose was stored.
     assert abs(said.zoom.value) < 3 * said.zoom.sigma
-    assert said.refined.camera.distance_m(real) < 0.2 * away_m
+    assert said.refined.camera.distance_m(REAL) < 0.2 * away_m
     # Where pixels are on the ground is known far better than where the camera stands.
     assert np.quantile(said.ground_sigma.metres, 0.95) < 0.5 * said.sigma.position_m
 
 
 def test_nights_through_another_lens_say_of_tonights_what_they_said_of_theirs():
     """The lens of the venue has become longer by 0.5 %, that of the camera has not."""
-    pitch = Field(105.0, 68.0, 0.12, template=load("football"))
-    real = camera("left", (0.0, -45.0, 14.0), (0.0, 0.0), focal=1000.0, size=(1280, 720))
-    given = with_focal_length(real, 5.0)
-    lines, unknowns = pitch.line_points(), Unknowns(1, [], Ground.under(pitch.line_points()))
-    found = replace(measured(lines, real), misfit_px=0.2)
-    memory = CameraMemory.from_first_job(real, AcceptedJob(real, found, lines, None, frames="first"))
-    here = replace(Estimate.initial(pitch, [given], unknowns), uneven_m=EVEN_M)
-    for _ in range(12):
-        here = gauss_newton_step(here, [given], [found], unknowns, huber_weights).to
-    (said,) = estimate_uncertainty(here, [given], [memory], [found], [NO_EVIDENCE], unknowns).each
+    memory = CameraMemory.from_first_job(REAL, AcceptedJob(REAL, SEEN, LINES, None, frames="first"))
+    given, here = with_focal_length(REAL, 5.0), refined_through_lens(5.0)
+    (said,) = estimate_uncertainty(here, [given], [memory], [SEEN], [NO_EVIDENCE], UNKNOWNS).each
     assert said.refined.camera.intrinsics.focal_length_px == pytest.approx(1000.0, abs=1.0)
-    assert said.refined.camera.distance_m(real) < 0.05
+    assert said.refined.camera.distance_m(REAL) < 0.05

@@ -10,6 +10,7 @@ import pytest
 
 from testbed.parameters import try_first
 from testbed.synthetic import CROWNED, moved, pair, pair_frames
+from tests.worker.video.shaking import turn
 from worker.calibration.detection.contrast import Channels
 from worker.calibration.detection.frame_fusion import Sway
 from worker.calibration.geometry import derivatives
@@ -31,16 +32,10 @@ def still_picture() -> np.ndarray:
     return pair_frames()[0]
 
 
-def turn(number: int) -> np.ndarray:
-    """0.3 degrees at 0.5 Hz about each axis, from where the stored pose was found on."""
-    phase = np.pi * number / FRAMES_PER_SECOND + np.array([0.0, 1.0, 2.0])
-    return np.radians(0.3) * (np.sin(phase) - np.sin([0.0, 1.0, 2.0]))
-
-
 @cache
 def frame(number: int) -> np.ndarray:
     """What the camera shows when it has turned: all of its picture turns alike."""
-    shaken = Sway.from_turn(-turn(number), LEFT.intrinsics).rows(still_picture(), 0, LEFT.intrinsics.size[1])
+    shaken = Sway.from_turn(-turn(number, 0.0), LEFT.intrinsics).rows(still_picture(), 0, LEFT.intrinsics.size[1])
     return with_noise(shaken, np.random.default_rng(number), 2)
 
 
@@ -50,7 +45,7 @@ def with_noise(picture: np.ndarray, rng: np.random.Generator, sigma: float) -> n
 
 
 def true(number: int):
-    return derivatives.moved(LEFT, np.append(turn(number), np.zeros(3)))
+    return derivatives.moved(LEFT, np.append(turn(number, 0.0), np.zeros(3)))
 
 
 @cache
