@@ -38,8 +38,8 @@ def shows(cameras, _, frames=1, spacing_s=0, within_s=None):
 
 
 @pytest.fixture
-def home_of_schedules(home, tmp_path, monkeypatch):
-    """A home whose queue is short; its cameras show something at once."""
+def app(home, tmp_path, monkeypatch):
+    """An application whose queue is short; its cameras show something at once."""
     home.make_database(tmp_path)
     made = ApplicationState(
         Settings(data=tmp_path, queue_limit=LIMIT, sources=["127.0.0.1"], **home.settings(tmp_path))
@@ -51,23 +51,34 @@ def home_of_schedules(home, tmp_path, monkeypatch):
 
 
 @pytest.fixture
-def duty(home_of_schedules):
-    made = home_of_schedules
+def duty(app):
+    return scheduler_of(app)
+
+
+def scheduler_of(app):
+    made = app
     return Scheduler(made.settings, made.schedules, made.venues, made.submissions, made.from_sources, made.disk)
 
 
-def put(home, name, options=None, alarms=None, source="http://127.0.0.1/x", **more):
+def put(app, name, options=None, alarms=None, source="http://127.0.0.1/x", **more):
     schedule = {"cron": "*/15 * * * *", "options": options} | more
     document = venue(name, cameras=("left",)) | {"schedule": schedule, "alarms": alarms}
     document["cameras"][0]["source"] = source
-    home.venues.put(VenueIn.model_validate(document).to_venue())
+    app.venues.put(VenueIn.model_validate(document).to_venue())
 
 
-def all_due(home, minutes=1):
+def all_due(app, minutes=1):
     """Let the times of all schedules have come so many minutes ago."""
-    a_while_ago = home.schedules.now() - timedelta(minutes=minutes)
-    with home.engine.begin() as connection:
-        connection.execute(sa.update(tables.schedules).values(due_at=a_while_ago, look_at=a_while_ago))
+    a_while_ago = app.schedules.now() - timedelta(minutes=minutes)
+    set_times(app, due_at=a_while_ago, look_at=a_while_ago)
+
+
+def set_times(app, *venues, **times):
+    """Write times of the schedules of these venues, or of all."""
+    every = sa.update(tables.schedules)
+    chosen = every.where(tables.schedules.c.venue.in_(venues)) if venues else every
+    with app.engine.begin() as connection:
+        connection.execute(chosen.values(times))
 
 
 def poll_until(duty, condition):
@@ -86,95 +97,87 @@ def look(duty, times=1):
         duty.finish()
 
 
-def waiting(home):
-    return home.jobs.page(JobPage(100, status="queued")).jobs
+def waiting(app):
+    return app.jobs.page(JobPage(100, status="queued")).jobs
 
 
 @in_both_homes
-def test_more_venues_than_the_queue_takes_are_all_calibrated_in_the_end(home_of_schedules, duty):
-    home = home_of_schedules
+def test_more_venues_than_the_queue_takes_are_all_calibrated_in_the_end(app, duty):
     for number in range(VENUES):
-        put(home, f"v{number}")
-    all_due(home)
+        put(app, f"v{number}")
+    all_due(app)
     calibrated = []
     for _ in range(VENUES):
         look(duty, times=3)
-        jobs = waiting(home)
+        jobs = waiting(app)
         assert len(jobs) <= LIMIT
         for job in jobs:
             calibrated.append(job.venue)
-            home.decisions.cancel(job.id)
+            app.decisions.cancel(job.id)
     assert sorted(calibrated) == [f"v{number}" for number in range(VENUES)]
 
 
-def test_a_full_queue_has_no_frames_fetched_in_vain(home_of_schedules, duty, monkeypatch):
-    home = home_of_schedules
+def test_a_full_queue_has_no_frames_fetched_in_vain(app, duty, monkeypatch):
     for number in range(LIMIT):
-        put(home, f"other{number}")
-        home.from_sources.calibrate(f"other{number}", Options(), None, scheduler.Origin())
-    put(home, "v")
-    all_due(home)
-    monkeypatch.setattr(home.snapshots, "take_of_all", lambda *_: pytest.fail("fetched"))
+        put(app, f"other{number}")
+        app.from_sources.calibrate(f"other{number}", Options(), None, scheduler.Origin())
+    put(app, "v")
+    all_due(app)
+    monkeypatch.setattr(app.snapshots, "take_of_all", lambda *_: pytest.fail("fetched"))
     look(duty)
-    assert home.venues.health("v").schedule.last_error is None
+    assert app.venues.health("v").schedule.last_error is None
 
 
-def test_frames_that_are_being_fetched_have_their_place_in_the_queue(home_of_schedules, duty, monkeypatch):
-    home, answered = home_of_schedules, threading.Event()
+def test_frames_that_are_being_fetched_have_their_place_in_the_queue(app, duty, monkeypatch):
+    answered = threading.Event()
     names = [f"v{number}" for number in range(VENUES)]
     for name in names:
-        put(home, name)
-    all_due(home)
+        put(app, name)
+    all_due(app)
     monkeypatch.setattr(scheduler, "POLL_S", 0.0)
-    monkeypatch.setattr(home.snapshots, "take_of_all", lambda *one, **more: answered.wait(60) and shows(*one, **more))
+    monkeypatch.setattr(app.snapshots, "take_of_all", lambda *one, **more: answered.wait(60) and shows(*one, **more))
     duty.poll()
     duty.poll()
     answered.set()
     duty.finish()
-    assert len(waiting(home)) == LIMIT
-    assert {home.venues.health(name).schedule.last_error for name in names} == {None}
+    assert len(waiting(app)) == LIMIT
+    assert {app.venues.health(name).schedule.last_error for name in names} == {None}
 
 
-def test_a_venue_that_is_being_calibrated_is_put_off_and_not_forgotten(home_of_schedules, duty):
-    home = home_of_schedules
-    put(home, "v")
-    by_hand, _ = home.from_sources.calibrate("v", Options(seed=3), None, scheduler.Origin())
-    all_due(home)
-    due = home.venues.health("v").schedule.next_at
+def test_a_venue_that_is_being_calibrated_is_put_off_and_not_forgotten(app, duty):
+    put(app, "v")
+    by_hand, _ = app.from_sources.calibrate("v", Options(seed=3), None, scheduler.Origin())
+    all_due(app)
+    due = app.venues.health("v").schedule.next_at
     look(duty)
-    state = home.venues.health("v").schedule
+    state = app.venues.health("v").schedule
     assert (state.next_at, state.last_job) == (due, None)
     assert "active job" in state.last_error
-    home.decisions.cancel(by_hand.id)
+    app.decisions.cancel(by_hand.id)
     look(duty)
-    assert waiting(home) == []
-    with home.engine.begin() as connection:
-        s = tables.schedules.c
-        sooner = home.schedules.now() - DEFER
-        connection.execute(sa.update(tables.schedules).where(s.venue == "v").values(look_at=sooner))
+    assert waiting(app) == []
+    set_times(app, "v", look_at=app.schedules.now() - DEFER)
     look(duty)
-    (job,) = waiting(home)
-    assert home.venues.health("v").schedule.last_job == job.id
-    assert home.venues.health("v").schedule.last_error is None
+    (job,) = waiting(app)
+    assert app.venues.health("v").schedule.last_job == job.id
+    assert app.venues.health("v").schedule.last_error is None
 
 
-def test_a_venue_that_cannot_be_read_says_so_and_fires_again_at_its_next_time(home_of_schedules, duty):
-    home = home_of_schedules
+def test_a_venue_that_cannot_be_read_says_so_and_fires_again_at_its_next_time(app, duty):
     for name in ("broken", "v"):
-        put(home, name)
-    all_due(home)
-    with home.engine.begin() as connection:
+        put(app, name)
+    all_due(app)
+    with app.engine.begin() as connection:
         is_broken = tables.venues.c.id == "broken"
         connection.execute(sa.update(tables.venues).where(is_broken).values(document={"id": "broken"}))
     look(duty)
-    assert [job.venue for job in waiting(home)] == ["v"]
-    state = home.venues.health("broken").schedule
-    assert (state.next_at > home.schedules.now(), "cannot be read" in state.last_error) == (True, True)
+    assert [job.venue for job in waiting(app)] == ["v"]
+    state = app.venues.health("broken").schedule
+    assert (state.next_at > app.schedules.now(), "cannot be read" in state.last_error) == (True, True)
 
 
-def test_a_camera_that_gives_no_frame_is_a_job_that_failed(home_of_schedules, duty, monkeypatch):
-    home = home_of_schedules
-    put(home, "v", alarms={"rejected_in_a_row": 2})
+def test_a_camera_that_gives_no_frame_is_a_job_that_failed(app, duty, monkeypatch):
+    put(app, "v", alarms={"rejected_in_a_row": 2})
     gone = Problem(
         "source-failed", "No frame of camera left: answered 404.", camera="left", source="http://127.0.0.1/x"
     )
@@ -182,67 +185,64 @@ def test_a_camera_that_gives_no_frame_is_a_job_that_failed(home_of_schedules, du
     def take(*_):
         raise gone
 
-    monkeypatch.setattr(home.snapshots, "take_of_all", take)
+    monkeypatch.setattr(app.snapshots, "take_of_all", take)
     for minutes in (3, 2):
-        all_due(home, minutes)
+        all_due(app, minutes)
         look(duty)
-    last, first = home.jobs.page(JobPage(10, venue="v")).jobs
+    last, first = app.jobs.page(JobPage(10, venue="v")).jobs
     assert (last.status, last.error.type, last.error.camera) == ("failed", "/problems/source-failed", "left")
-    assert last.error.detail == home.venues.health("v").schedule.last_error == gone.detail
-    assert home.venues.health("v").schedule.last_job == last.id != first.id
-    assert [alarm.rule for alarm in home.venues.health("v").alarms] == ["rejected-in-a-row"]
-    assert look_at_figures(home.engine, 1).counters[ENDED, ("failed", "", "source-failed")] == 2
+    assert last.error.detail == app.venues.health("v").schedule.last_error == gone.detail
+    assert app.venues.health("v").schedule.last_job == last.id != first.id
+    assert [alarm.rule for alarm in app.venues.health("v").alarms] == ["rejected-in-a-row"]
+    assert look_at_figures(app.engine, 1).counters[ENDED, ("failed", "", "source-failed")] == 2
     # There is nothing to compute again, and nothing in the way of the next time.
-    assert home.submissions.of(last.id) is None
-    assert home.expiry.old_frames(home.schedules.now() + timedelta(days=1), 10) == []
-    monkeypatch.setattr(home.snapshots, "take_of_all", shows)
-    all_due(home)
+    assert app.submissions.of(last.id) is None
+    assert app.expiry.old_frames(app.schedules.now() + timedelta(days=1), 10) == []
+    monkeypatch.setattr(app.snapshots, "take_of_all", shows)
+    all_due(app)
     look(duty)
-    assert [job.venue for job in waiting(home)] == ["v"]
-    assert home.venues.health("v").schedule.last_error is None
+    assert [job.venue for job in waiting(app)] == ["v"]
+    assert app.venues.health("v").schedule.last_error is None
 
 
 @in_both_homes
-def test_a_time_that_failed_and_is_fired_again_is_the_same_job(home_of_schedules, duty, monkeypatch):
-    home = home_of_schedules
-    put(home, "v")
-    monkeypatch.setattr(home.snapshots, "take_of_all", lambda *_: fail_with("source-failed"))
+def test_a_time_that_failed_and_is_fired_again_is_the_same_job(app, duty, monkeypatch):
+    put(app, "v")
+    monkeypatch.setattr(app.snapshots, "take_of_all", lambda *_: fail_with("source-failed"))
     with monkeypatch.context() as patch:
         # The worker dies before it writes down that it is done.
-        patch.setattr(home.schedules, "done", lambda *_: 1 / 0)
-        all_due(home)
+        patch.setattr(app.schedules, "done", lambda *_: 1 / 0)
+        all_due(app)
         look(duty)
-    with home.engine.begin() as connection:
-        connection.execute(sa.update(tables.schedules).values(look_at=tables.schedules.c.due_at))
+    set_times(app, look_at=tables.schedules.c.due_at)
     look(duty)
-    (job,) = home.jobs.page(JobPage(10, venue="v")).jobs
-    assert home.venues.health("v").schedule.last_job == job.id
+    (job,) = app.jobs.page(JobPage(10, venue="v")).jobs
+    assert app.venues.health("v").schedule.last_job == job.id
 
 
-def test_a_schedule_says_how_it_is_to_be_calibrated(home_of_schedules, duty):
-    home = home_of_schedules
-    put(home, "v", options={"preset": "esc", "priority": "live", "dry_run": True})
-    all_due(home)
+def test_a_schedule_says_how_it_is_to_be_calibrated(app, duty):
+    put(app, "v", options={"preset": "esc", "priority": "live", "dry_run": True})
+    all_due(app)
     look(duty)
-    (job,) = waiting(home)
-    options = home.submissions.of(job.id).options
+    (job,) = waiting(app)
+    options = app.submissions.of(job.id).options
     assert (options.priority, options.dry_run) == ("live", True)
 
 
-def test_a_schedule_may_have_several_frames_of_each_camera_fused(home_of_schedules, duty, monkeypatch):
-    home, asked = home_of_schedules, []
+def test_a_schedule_may_have_several_frames_of_each_camera_fused(app, duty, monkeypatch):
+    asked = []
 
     def take(cameras, _, frames, spacing_s, within_s):
         asked.append((frames, spacing_s))
         return {camera.id: [png(shade=shade) for shade in range(frames)] for camera in cameras}
 
-    monkeypatch.setattr(home.snapshots, "take_of_all", take)
-    put(home, "v", frames=3, spacing_s=2.5)
-    all_due(home)
+    monkeypatch.setattr(app.snapshots, "take_of_all", take)
+    put(app, "v", frames=3, spacing_s=2.5)
+    all_due(app)
     look(duty)
-    (job,) = waiting(home)
-    paths = home.submissions.of(job.id).frames["left"]
-    assert [home.blobs.get(path) for path in paths] == [png(shade=shade) for shade in range(3)]
+    (job,) = waiting(app)
+    paths = app.submissions.of(job.id).frames["left"]
+    assert [app.blobs.get(path) for path in paths] == [png(shade=shade) for shade in range(3)]
     assert asked == [(3, 2.5)]
 
 
@@ -250,51 +250,45 @@ def fail_with(kind):
     raise Problem(kind, "No frame.", camera="left")
 
 
-def test_those_that_were_put_off_go_before_those_that_came_after(home_of_schedules):
-    home = home_of_schedules
+def test_those_that_were_put_off_go_before_those_that_came_after(app):
     for name in ("late", "early"):
-        put(home, name)
-    now = home.schedules.now()
-    with home.engine.begin() as connection:
-        s = tables.schedules.c
-        # It was put off until now, and the other one becomes due.
-        early = {"due_at": now - timedelta(minutes=15), "look_at": now}
-        connection.execute(sa.update(tables.schedules).values(due_at=now, look_at=now - timedelta(seconds=1)))
-        connection.execute(sa.update(tables.schedules).where(s.venue == "early").values(**early))
-    assert [firing.venue_id for firing in home.schedules.claim_due(now, now + timedelta(minutes=1), 1)] == ["early"]
+        put(app, name)
+    now = app.schedules.now()
+    # It was put off until now, and the other one becomes due.
+    set_times(app, "late", due_at=now, look_at=now - timedelta(seconds=1))
+    set_times(app, "early", due_at=now - timedelta(minutes=15), look_at=now)
+    assert [firing.venue_id for firing in app.schedules.claim_due(now, now + timedelta(minutes=1), 1)] == ["early"]
 
 
-def test_a_camera_that_is_slow_holds_up_no_other_venue(home_of_schedules, duty, monkeypatch):
-    home, put_through = home_of_schedules, threading.Event()
+def test_a_camera_that_is_slow_holds_up_no_other_venue(app, duty, monkeypatch):
+    put_through = threading.Event()
     for name in ("a-slow", "b"):
-        put(home, name)
-    all_due(home)
+        put(app, name)
+    all_due(app)
 
     def take(cameras, *_):
         if cameras[0].source.endswith("slow"):
             assert put_through.wait(60)
         return shows(cameras, *_)
 
-    slow = home.venues.get("a-slow")
+    slow = app.venues.get("a-slow")
     cameras = [camera.model_copy(update={"source": "http://127.0.0.1/slow"}) for camera in slow.cameras]
-    home.venues.put(slow.model_copy(update={"cameras": cameras}))
-    monkeypatch.setattr(home.snapshots, "take_of_all", take)
+    app.venues.put(slow.model_copy(update={"cameras": cameras}))
+    monkeypatch.setattr(app.snapshots, "take_of_all", take)
     duty.poll()
     # What is being fired is due no earlier than in ten minutes.
-    put(home, "c")
-    with home.engine.begin() as connection:
-        due = sa.update(tables.schedules).where(tables.schedules.c.venue == "c")
-        connection.execute(due.values(due_at=home.schedules.now(), look_at=home.schedules.now()))
-    poll_until(duty, lambda: "c" in [job.venue for job in waiting(home)])
+    put(app, "c")
+    set_times(app, "c", due_at=app.schedules.now(), look_at=app.schedules.now())
+    poll_until(duty, lambda: "c" in [job.venue for job in waiting(app)])
     put_through.set()
     duty.finish()
 
 
-def test_venues_whose_cameras_answer_do_not_wait_for_silent_ones(home_of_schedules, duty, monkeypatch):
-    home, given_up = home_of_schedules, threading.Event()
+def test_venues_whose_cameras_answer_do_not_wait_for_silent_ones(app, duty, monkeypatch):
+    given_up = threading.Event()
     silent = [f"silent-{number}" for number in range(3 * scheduler.AT_ONCE)]
     for name in silent:
-        put(home, name, source="http://127.0.0.1/silent")
+        put(app, name, source="http://127.0.0.1/silent")
 
     def take(cameras, _, frames, spacing_s, within_s):
         if not cameras[0].source.endswith("silent"):
@@ -303,22 +297,20 @@ def test_venues_whose_cameras_answer_do_not_wait_for_silent_ones(home_of_schedul
             assert given_up.wait(60)
         raise SourceLate("source-failed", "No frame.", camera="left")
 
-    monkeypatch.setattr(home.snapshots, "take_of_all", take)
-    all_due(home, minutes=2)
+    monkeypatch.setattr(app.snapshots, "take_of_all", take)
+    all_due(app, minutes=2)
     # Each is tried once where others wait for it, and from then on where only its like do.
-    poll_until(duty, lambda: not look_at_figures(home.engine, 1).schedules_late_s[0])
-    put(home, "live")
-    with home.engine.begin() as connection:
-        now, s = home.schedules.now(), tables.schedules.c
-        connection.execute(sa.update(tables.schedules).where(s.venue == "live").values(due_at=now, look_at=now))
-    assert [job.venue for job in poll_until(duty, lambda: waiting(home))] == ["live"]
-    answered, silent_ones = look_at_figures(home.engine, 1).schedules_late_s
+    poll_until(duty, lambda: not look_at_figures(app.engine, 1).schedules_late_s[0])
+    put(app, "live")
+    set_times(app, "live", due_at=app.schedules.now(), look_at=app.schedules.now())
+    assert [job.venue for job in poll_until(duty, lambda: waiting(app))] == ["live"]
+    answered, silent_ones = look_at_figures(app.engine, 1).schedules_late_s
     # Its job waits a moment before its schedule is done.
     assert answered < 30
     assert silent_ones >= 120
     given_up.set()
-    poll_until(duty, lambda: not look_at_figures(home.engine, 1).schedules_late_s[1])
-    assert sorted(job.venue for job in home.jobs.page(JobPage(100, status="failed")).jobs) == sorted(silent)
+    poll_until(duty, lambda: not look_at_figures(app.engine, 1).schedules_late_s[1])
+    assert sorted(job.venue for job in app.jobs.page(JobPage(100, status="failed")).jobs) == sorted(silent)
 
 
 @contextmanager
@@ -340,29 +332,29 @@ def hosts_that_accept_nobody(count):
 
 @pytest.fixture
 def roomy(tmp_path):
-    """A home with room for the jobs of many venues, and real cameras."""
+    """An application with room for the jobs of many venues, and real cameras."""
     made = ApplicationState(Settings(data=tmp_path, sources=["127.0.0.0/8"], source_timeout_s=3))
     yield made
     made.close()
 
 
-def quick_fetches(home, monkeypatch):
+def quick_fetches(app, monkeypatch):
     """The venues' sources that are fetched from in the quick lane, as they are."""
-    fetched_from, take = [], home.snapshots.take_of_all
+    fetched_from, take = [], app.snapshots.take_of_all
 
     def noted(cameras, credentials, frames, spacing_s, within_s):
         if within_s is not None:
             fetched_from.append(cameras[0].source)
         return take(cameras, credentials, frames, spacing_s, within_s)
 
-    monkeypatch.setattr(home.snapshots, "take_of_all", noted)
+    monkeypatch.setattr(app.snapshots, "take_of_all", noted)
     return fetched_from
 
 
-def fire_until_a_job_waits(home):
-    duty = Scheduler(home.settings, home.schedules, home.venues, home.submissions, home.from_sources, home.disk)
-    all_due(home)
-    assert [job.venue for job in poll_until(duty, lambda: waiting(home))] == ["z-live"]
+def fire_until_a_job_waits(app):
+    duty = scheduler_of(app)
+    all_due(app)
+    assert [job.venue for job in poll_until(duty, lambda: waiting(app))] == ["z-live"]
     duty.finish()
 
 
@@ -393,10 +385,10 @@ def test_from_cameras_that_cannot_be_connected_to_nothing_is_fetched_while_other
 
 
 def test_a_camera_that_takes_long_is_given_its_time_in_the_slow_lane_and_comes_back_once_it_is_quick(
-    home_of_schedules, duty, monkeypatch
+    app, duty, monkeypatch
 ):
-    home, asked = home_of_schedules, []
-    put(home, "v")
+    asked = []
+    put(app, "v")
 
     def take(cameras, _, frames, spacing_s, within_s):
         asked.append(within_s)
@@ -404,56 +396,52 @@ def test_a_camera_that_takes_long_is_given_its_time_in_the_slow_lane_and_comes_b
             raise SourceLate("source-failed", "No frame.", camera="left")
         return shows(cameras, _)
 
-    monkeypatch.setattr(home.snapshots, "take_of_all", take)
+    monkeypatch.setattr(app.snapshots, "take_of_all", take)
     for minutes in (8, 7):
-        all_due(home, minutes)
+        all_due(app, minutes)
         look(duty, times=2)
-        (job,) = waiting(home)
-        home.decisions.cancel(job.id)
+        (job,) = waiting(app)
+        app.decisions.cancel(job.id)
     # The first time it was tried quickly, went to the slow lane and was not slow there.
     assert asked == [scheduler.QUICK_S, None] * 2
     monkeypatch.setattr(scheduler, "QUICK_S", -1.0)
     for minutes in (6, 5):
-        all_due(home, minutes)
+        all_due(app, minutes)
         look(duty, times=2)
-        (job,) = waiting(home)
-        home.decisions.cancel(job.id)
+        (job,) = waiting(app)
+        app.decisions.cancel(job.id)
     # The second time it was known to be slow.
     assert asked[4:] == [-1.0, None, None]
 
 
 @in_both_homes
-def test_schedules_that_a_clock_was_ahead_for_fire_at_their_next_time(home_of_schedules, duty):
-    home = home_of_schedules
+def test_schedules_that_a_clock_was_ahead_for_fire_at_their_next_time(app, duty):
     for name in ("waits", "claimed"):
-        put(home, name)
+        put(app, name)
     look(duty)
-    now = home.schedules.now()
+    now = app.schedules.now()
     hours = timedelta(hours=6)
-    with home.engine.begin() as connection:
-        s = tables.schedules.c
-        # As a worker left them whose clock was six hours ahead: one waits for its next time, the other was being fired.
-        connection.execute(sa.update(tables.schedules).values(due_at=now + hours, look_at=now + hours))
-        claimed = {"due_at": now - timedelta(minutes=1), "look_at": now + hours}
-        connection.execute(sa.update(tables.schedules).where(s.venue == "claimed").values(**claimed))
-    restarted = Scheduler(home.settings, home.schedules, home.venues, home.submissions, home.from_sources, home.disk)
+    # As a worker left them whose clock was six hours ahead: one waits for its next time, the other was being fired.
+    set_times(app, "waits", due_at=now + hours, look_at=now + hours)
+    set_times(app, "claimed", due_at=now - timedelta(minutes=1), look_at=now + hours)
+    restarted = scheduler_of(app)
     look(restarted)
-    assert [job.venue for job in waiting(home)] == ["claimed"]
+    assert [job.venue for job in waiting(app)] == ["claimed"]
     for name in ("waits", "claimed"):
-        assert home.venues.health(name).schedule.next_at <= now + timedelta(minutes=31)
+        assert app.venues.health(name).schedule.next_at <= now + timedelta(minutes=31)
 
 
 @in_both_homes
-def test_a_clock_that_is_put_right_while_a_worker_runs_delays_no_schedule(home_of_schedules, duty, monkeypatch):
-    home, due = home_of_schedules, home_of_schedules.schedules.due
-    put(home, "v")
+def test_a_clock_that_is_put_right_while_a_worker_runs_delays_no_schedule(app, duty, monkeypatch):
+    due = app.schedules.due
+    put(app, "v")
     hours = timedelta(hours=6)
     with monkeypatch.context() as patch:
-        patch.setattr(home.schedules, "now", lambda: datetime.now(UTC) + hours)
-        patch.setattr(home.schedules, "due", lambda: replace(due(), now=datetime.now(UTC) + hours, quick=1))
-        all_due(home, minutes=0)
+        patch.setattr(app.schedules, "now", lambda: datetime.now(UTC) + hours)
+        patch.setattr(app.schedules, "due", lambda: replace(due(), now=datetime.now(UTC) + hours, quick=1))
+        all_due(app, minutes=0)
         look(duty)
-    assert [job.venue for job in waiting(home)] == ["v"]
-    assert home.venues.health("v").schedule.next_at > datetime.now(UTC) + hours
+    assert [job.venue for job in waiting(app)] == ["v"]
+    assert app.venues.health("v").schedule.next_at > datetime.now(UTC) + hours
     look(duty)
-    assert home.venues.health("v").schedule.next_at <= datetime.now(UTC) + timedelta(minutes=31)
+    assert app.venues.health("v").schedule.next_at <= datetime.now(UTC) + timedelta(minutes=31)

@@ -48,11 +48,6 @@ def test_the_ray_through_a_projected_point_meets_the_point_again(distortion, hei
     np.testing.assert_allclose(met, points[seen], atol=1e-6)
 
 
-def test_a_point_behind_the_camera_has_no_pixel():
-    camera = Camera("a", lens(), Pose.looking_at([0, -50, 10], [0, 0, 0]))
-    assert np.isnan(camera.project(np.array([[0.0, -80.0, 0.0]]))).all()
-
-
 def test_a_point_where_the_lens_model_folds_back_has_no_pixel():
     # r (1 - 0.4 r²) grows up to r = 0.91 and would put a point at r = 1.5 back into the picture.
     intrinsics = lens([-0.4, 0.0, 0.0, 0.0])
