@@ -9,10 +9,9 @@ import pytest
 from models import MODEL_PATH
 from models.training.evaluate import judge
 from models.training.pitches.render import Conditions, render_frame
+from testbed.synthetic import camera
 from worker.calibration.detection.segmentation import Segmenter, whole_frame
-from worker.calibration.geometry.camera import Camera, Pose
 from worker.calibration.geometry.field import Field
-from worker.calibration.geometry.lens import Intrinsics
 
 
 @pytest.fixture(scope="module")
@@ -38,12 +37,9 @@ def test_the_interface_is_the_contract(model):
 @pytest.mark.long
 def test_it_finds_the_lines_of_a_pitch_it_has_not_seen_and_little_else(model):
     field = Field(100.0, 64.0, 0.12, np.array([[-15.0, 0.0, 0.3], [15.0, 0.0, 0.3]]))
-    lens = Intrinsics(
-        np.array([[900.0, 0, 639.5], [0, 900.0, 359.5], [0, 0, 1]]), np.array([-0.3, 0.09, 0, 0, 0]), (1280, 720)
-    )
-    camera = Camera("left", lens, Pose.looking_at([-2.0, -46.0, 11.0], [-24.0, -8.0, 0.0]))
-    frame = render_frame(field, camera, replace(Conditions.fair(56), wear=0.04), np.random.default_rng(0)).frame
-    figures = judge(field, camera, model(frame, whole_frame(lens.size)) / np.float32(255))
+    one = camera("left", (-2.0, -46.0, 11.0), (-24.0, -8.0), 900.0, (-0.3, 0.09, 0, 0, 0), (1280, 720))
+    frame = render_frame(field, one, replace(Conditions.fair(56), wear=0.04), np.random.default_rng(0)).frame
+    figures = judge(field, one, model(frame, whole_frame((1280, 720))) / np.float32(255))
     assert figures.recall > 0.6
     assert figures.precision > 0.8
     assert figures.false_alarms < 0.002

@@ -37,6 +37,13 @@ def typed(step: str, folder: Path) -> subprocess.CompletedProcess:
     return done
 
 
+def camera_at(stored: dict, pose: dict) -> Camera:
+    """A camera of a venue's document, at a pose of a document."""
+    matrix, distortion = (np.array(stored["intrinsics"][name]) for name in ("matrix", "distortion"))
+    lens = Intrinsics(matrix, distortion, tuple(stored["image_size"]))
+    return Camera(stored["id"], lens, Pose(np.array(pose["rotation"]), np.array(pose["position"])))
+
+
 @pytest.fixture(scope="module")
 def lenses(real_pair, tmp_path_factory) -> Path:
     """Files of the lenses, from every other photo: to look for boards takes longer than all the rest."""
@@ -92,13 +99,7 @@ def test_from_frames_and_the_sport_alone_both_cameras_are_found(real_pair, tmp_p
     venue = json.loads((tmp_path / "found.json").read_text())
     assert venue["field"]["ridge"][0][2] == pytest.approx(0.237, abs=0.05)
     for camera in venue["cameras"]:
-        lens = Intrinsics(
-            np.array(camera["intrinsics"]["matrix"]),
-            np.array(camera["intrinsics"]["distortion"]),
-            tuple(camera["image_size"]),
-        )
-        pose = Pose(np.array(camera["pose"]["rotation"]), np.array(camera["pose"]["position"]))
-        assert real_pair.clicked_rms_of(Camera(camera["id"], lens, pose)) < 5
+        assert real_pair.clicked_rms_of(camera_at(camera, camera["pose"])) < 5
 
 
 @pytest.mark.parametrize(("side", "bare"), [("left", "right"), ("right", "left")])
@@ -161,13 +162,7 @@ def test_the_calibration_is_accepted_and_ends_at_the_clicked_points(real_pair, w
     place = venue["field"]
     pitch = Field(place["length_m"], place["width_m"], place["line_width_m"], np.array(place["ridge"]))
     for stored, found in zip(venue["cameras"], result["cameras"], strict=True):
-        lens = Intrinsics(
-            np.array(stored["intrinsics"]["matrix"]),
-            np.array(stored["intrinsics"]["distortion"]),
-            tuple(stored["image_size"]),
-        )
-        pose = Pose(np.array(found["pose"]["rotation"]), np.array(found["pose"]["position"]))
         clicks = real_pair.clicks[found["id"]]
         world = pitch.lift(np.array([click["world"] for click in clicks], dtype=float))
-        off = Camera(found["id"], lens, pose).project(world) - np.array([click["pixel"] for click in clicks])
+        off = camera_at(stored, found["pose"]).project(world) - np.array([click["pixel"] for click in clicks])
         assert np.sqrt(np.mean(np.sum(off**2, axis=1))) < 4

@@ -45,10 +45,13 @@ def frame():
     return np.clip(noisy, 0, 255).astype(np.uint8)
 
 
+def calibrated(stored, pictures, field=NETBALL, **options):
+    return calibrate(field, [stored], {"hall": pictures}, Segmenter(MODEL_PATH, 1), Options(**options))
+
+
 @cache
 def found_nearby():
-    stored = moved(CAMERA, (0.0004, -0.0003, 0.0002), (0.002, 0.001, -0.002))
-    return calibrate(NETBALL, [stored], {"hall": [frame()]}, Segmenter(MODEL_PATH, 1), Options())
+    return calibrated(moved(CAMERA, (0.0004, -0.0003, 0.0002), (0.002, 0.001, -0.002)), [frame()])
 
 
 def off_px(result):
@@ -56,18 +59,12 @@ def off_px(result):
 
 
 @pytest.mark.long
-def test_a_camera_is_found_by_the_lines_of_its_own_sport():
-    found = calibrate(NETBALL, [STORED], {"hall": [frame()]}, Segmenter(MODEL_PATH, 1), Options()).cameras[0]
+@pytest.mark.parametrize("count", [1, 2])
+def test_a_camera_is_found_by_the_lines_of_its_own_sport(count):
+    """The paint is seen in one of its frames."""
+    (found,) = calibrated(STORED, count * [frame()]).cameras
     assert found.accepted, found.rejected_because
     assert off_px(found) < 0.5
-
-
-@pytest.mark.long
-def test_of_several_frames_the_paint_is_seen_in_one():
-    frames = {"hall": [frame(), frame()]}
-    result = calibrate(NETBALL, [STORED], frames, Segmenter(MODEL_PATH, 1), Options()).cameras[0]
-    assert result.accepted, result.rejected_because
-    assert off_px(result) < 0.5
 
 
 @pytest.mark.long
@@ -100,8 +97,7 @@ def test_a_pose_loses_by_how_far_its_camera_would_have_moved_what_it_gains_by_li
 def test_without_their_colour_the_pose_is_drawn_to_lines_of_the_others(monkeypatch):
     """This floor is as hard as it is meant to be."""
     monkeypatch.setattr(solve, "show_paint_of_field", lambda *_: None)
-    options = Options(recover="never")
-    result = calibrate(NETBALL, [STORED], {"hall": [frame()]}, Segmenter(MODEL_PATH, 1), options).cameras[0]
+    (result,) = calibrated(STORED, [frame()], recover="never").cameras
     assert off_px(result) > 1.5
 
 
@@ -118,8 +114,7 @@ def test_a_pose_that_all_colours_are_sure_of_is_not_given_up_for_the_same_one_in
     # By how far cameras moved, one of two poses that are the same is always a little likelier.
     odds = iter([1.0, 0.0])
     monkeypatch.setattr(solve, "_log_odds", lambda *_: next(odds, 0.0))
-    options = Options(search="wide", recover="never")
-    result = calibrate(VOLLEYBALL, [STORED], {"hall": [whole]}, Segmenter(MODEL_PATH, 1), options).cameras[0]
+    (result,) = calibrated(STORED, [whole], VOLLEYBALL, search="wide", recover="never").cameras
     assert result.accepted, result.rejected_because
 
 

@@ -36,10 +36,9 @@ def believed(longer: float) -> Camera:
     return moved(was.with_lens(replace(was.intrinsics, sigma=BOARD)), *WIND)
 
 
-@cache
-def calibrated(longer: float, lens_may_drift: bool) -> Calibration:
-    options = Options(seed=1, generations=20, lens_may_drift=lens_may_drift)
-    return calibrate(SQUARE, [believed(longer)], {"tele": [picture()]}, white_on_green, options)
+def calibrated(stored: Camera, generations: int = 20, **options) -> Calibration:
+    options = Options(seed=1, generations=generations, **options)
+    return calibrate(SQUARE, [stored], {"tele": [picture()]}, white_on_green, options)
 
 
 def off_m(found: Calibration) -> float:
@@ -47,7 +46,7 @@ def off_m(found: Calibration) -> float:
 
 
 def test_a_lens_that_has_not_changed_is_not_doubted():
-    found = calibrated(0.0, lens_may_drift=True)
+    found = calibrated(believed(0.0), lens_may_drift=True)
     assert found.accepted
     assert not found.cameras[0].lens_found
     assert off_m(found) < 3 * found.cameras[0].sigma.position_m < 0.3
@@ -55,7 +54,7 @@ def test_a_lens_that_has_not_changed_is_not_doubted():
 
 @pytest.mark.parametrize("longer", try_first([ZOOM, -ZOOM]))
 def test_a_zoom_is_rejected_and_what_it_did_is_answered(longer):
-    found = calibrated(longer, lens_may_drift=False)
+    found = calibrated(believed(longer))
     one = found.cameras[0]
     assert not found.accepted
     assert ("longer" if longer > 0 else "shorter") in one.rejected_because
@@ -67,7 +66,7 @@ def test_a_zoom_is_rejected_and_what_it_did_is_answered(longer):
 
 @pytest.mark.long
 def test_a_lens_that_may_drift_is_accepted_with_the_focal_length_it_has():
-    found = calibrated(ZOOM, lens_may_drift=True)
+    found = calibrated(believed(ZOOM), lens_may_drift=True)
     one = found.cameras[0]
     assert found.accepted
     assert one.camera.intrinsics.matrix[0, 0] == pytest.approx(2000.0, abs=3 * one.zoom.sigma)
@@ -97,8 +96,7 @@ def test_the_neighbours_of_a_camera_that_zoomed_are_finished_without_it(monkeypa
 @pytest.mark.long
 def test_a_camera_that_moved_has_not_zoomed():
     far = moved(plane(), (0.006, -0.008, 0.004), (0.15, 0.1, -0.1))
-    options = Options(seed=1, generations=60, lens_may_drift=True)
-    found = calibrate(SQUARE, [far], {"tele": [picture()]}, white_on_green, options)
+    found = calibrated(far, 60, lens_may_drift=True)
     assert found.accepted
     assert not found.cameras[0].lens_found
     assert off_m(found) < 3 * found.cameras[0].sigma.position_m
@@ -108,6 +106,6 @@ def test_a_camera_that_moved_has_not_zoomed():
 def test_a_lens_known_to_be_uncertain_is_not_called_zoomed():
     unsure = believed(0.004)
     unsure = replace(unsure, intrinsics=replace(unsure.intrinsics, sigma={"fx": 10.0}))
-    found = calibrate(SQUARE, [unsure], {"tele": [picture()]}, white_on_green, Options(seed=1, generations=60))
+    found = calibrated(unsure, 60)
     assert "zoom" not in (found.rejected_because or "")
     assert off_m(found) < 3 * found.cameras[0].sigma.position_m

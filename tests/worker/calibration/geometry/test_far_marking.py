@@ -1,19 +1,15 @@
 """How far apart two cameras put the same pixels on the ground, at the far touchline."""
 
-import numpy as np
 import pytest
 
+from testbed.synthetic import PITCH, camera, moved
 from tests.scenes import unposed
-from worker.calibration.geometry.camera import Camera, Pose
+from worker.calibration.geometry.camera import Pose
 from worker.calibration.geometry.far_marking import far_marking_shift_m
-from worker.calibration.geometry.field import Field
-from worker.calibration.geometry.lens import Intrinsics
 from worker.calibration.geometry.parameters import with_focal_length
 
-PITCH = Field(105.0, 68.0)
 HEIGHT_M, AWAY_M = 10.0, 84.0
-LENS = Intrinsics(np.array([[2000.0, 0, 1920], [0, 2000, 1080], [0, 0, 1]]), np.zeros(4), (3840, 2160))
-CAMERA = Camera("left", LENS, Pose.looking_at([0.0, 34.0 - AWAY_M, HEIGHT_M], [0.0, 0.0, 0.0]))
+CAMERA = camera("left", (0.0, 34.0 - AWAY_M, HEIGHT_M), (0.0, 0.0), focal=2000.0, size=(3840, 2160))
 
 
 def test_a_camera_and_itself_put_them_at_the_same_place():
@@ -21,12 +17,11 @@ def test_a_camera_and_itself_put_them_at_the_same_place():
 
 
 def test_a_camera_that_is_shifted_shifts_them_by_as_much():
-    there = CAMERA.with_pose(Pose(CAMERA.pose.rotation, CAMERA.pose.position + [0.03, 0.04, 0.0]))
-    assert far_marking_shift_m(PITCH, CAMERA, there) == pytest.approx(0.05, abs=1e-9)
+    assert far_marking_shift_m(PITCH, CAMERA, moved(CAMERA, by=(0.03, 0.04, 0.0))) == pytest.approx(0.05, abs=1e-9)
 
 
 def test_a_camera_that_is_higher_puts_the_far_touchline_farther_by_how_flat_it_sees_it():
-    higher = CAMERA.with_pose(Pose(CAMERA.pose.rotation, CAMERA.pose.position + [0.0, 0.0, 0.02]))
+    higher = moved(CAMERA, by=(0.0, 0.0, 0.02))
     # Straight ahead by 84 m per 10 m of height, and as much along the line to its sides in view.
     assert far_marking_shift_m(PITCH, CAMERA, higher) == pytest.approx(0.02 * AWAY_M / HEIGHT_M, rel=0.1)
 

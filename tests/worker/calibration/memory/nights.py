@@ -8,25 +8,21 @@ from dataclasses import replace
 import numpy as np
 
 from testbed.simulated_nights import SHARED_PX, Installation, Painted, SimulatedSight
-from testbed.synthetic import TAPED
+from testbed.synthetic import TAPED, camera
 from worker.calibration.detection.line_measurement import Measurements
 from worker.calibration.gate.quality import CameraResult
-from worker.calibration.geometry.camera import Camera, Pose
+from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.field import Field
-from worker.calibration.geometry.lens import Intrinsics
 from worker.calibration.geometry.parameters import with_focal_length
 from worker.calibration.memory.camera_memory import AcceptedJob
 
 PITCH = Field(105.0, 68.0, 0.12, np.array([[-18.5, 0.0, 0.3], [18.5, 0.0, 0.3]]), sigma=TAPED)
 LINES = PITCH.line_points()
-SIZE = (3840, 2160)
 
 
 def box_camera() -> Camera:
     """One that looks at a penalty area from 50 m."""
-    matrix = np.array([[4000.0, 0, 1919.5], [0, 4000.0, 1079.5], [0, 0, 1]])
-    lens = Intrinsics(matrix, np.array([-0.08, 0.006, 0, 0, 0]), SIZE)
-    return Camera("box", lens, Pose.looking_at(np.array([40.0, -45.0, 16.0]), np.array([44.0, 0.0, 0.0])))
+    return camera("box", (40.0, -45.0, 16.0), (44.0, 0.0), 4000.0, (-0.08, 0.006, 0, 0, 0), (3840, 2160))
 
 
 def painted(seed: int = 0) -> Painted:

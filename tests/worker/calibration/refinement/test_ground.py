@@ -7,10 +7,9 @@ import pytest
 
 from fields.template import TURF_M, load
 from testbed.simulated_nights import Painted, SimulatedSight
-from worker.calibration.geometry.camera import Camera, Pose
+from testbed.synthetic import camera
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.ground import Ground
-from worker.calibration.geometry.lens import Intrinsics
 from worker.calibration.geometry.parameters import field_parameters, lens_parameters, with_lens_changed
 from worker.calibration.refinement.refine import refine
 
@@ -18,28 +17,24 @@ pytestmark = pytest.mark.slow
 
 NIGHTS = 12
 HALL = Field(40.0, 20.0, 0.05, None, load("handball"))
-SIZE = (1920, 1080)
 
 
 def hall_camera():
     """On a gallery beside the court, over one half of it."""
-    matrix = np.array([[1400.0, 0, 959.5], [0, 1400.0, 539.5], [0, 0, 1]])
-    pose = Pose.looking_at(np.array([-4.0, -19.0, 6.0]), np.array([-8.0, 0.0, 0.0]), roll_deg=0.0)
-    return Camera("hall", Intrinsics(matrix, np.zeros(5), SIZE, {}), pose)
+    return camera("hall", (-4.0, -19.0, 6.0), (-8.0, 0.0), focal=1400.0, size=(1920, 1080))
 
 
 def finished(court, painted, rng, real=None):
-    camera = hall_camera()
-    sight = SimulatedSight(painted, [real or camera], 0.2 * rng.normal(size=(1, len(painted.lines))))
-    return refine(court, [camera], sight, 0.5).each[0]
+    sight = SimulatedSight(painted, [real or hall_camera()], 0.2 * rng.normal(size=(1, len(painted.lines))))
+    return refine(court, [hall_camera()], sight, 0.5).each[0]
 
 
 def drawn_as_expected(court, rng):
     """A painted court and a camera whose numbers are all off by what is expected of them."""
-    painted, camera = Painted.drawn(court, rng), hall_camera()
+    painted = Painted.drawn(court, rng)
     there = painted.there + sum(p.expected * rng.normal() * p.shift for p in field_parameters(court))
-    lens = np.array([p.expected * rng.normal() for p in lens_parameters([camera])])
-    return replace(painted, there=there), with_lens_changed(camera, lens)
+    lens = np.array([p.expected * rng.normal() for p in lens_parameters([hall_camera()])])
+    return replace(painted, there=there), with_lens_changed(hall_camera(), lens)
 
 
 @pytest.mark.long

@@ -49,6 +49,10 @@ def response_to(frame):
 def search(pitch, truth, frame, lens_is_known=True, place=Place(), sureness=1.0):  # noqa: B008  (frozen)
     lenses = [SoughtLens.known(truth.intrinsics)] if lens_is_known else unknown_lenses(truth.intrinsics.size)
     sought = SoughtCamera(truth.id, lenses, place)
+    return search_for(sought, pitch, frame, sureness)
+
+
+def search_for(sought, pitch, frame, sureness=1.0):
     return relocalise(pitch, FieldMap.of(pitch), sought, Channels([frame]), response_to(frame) * sureness, 1)
 
 
@@ -93,7 +97,7 @@ def test_a_lens_that_bends_much_more_than_usual_ones_is_found_with_the_pose():
     barrel = camera("one", (-6.0, -52.0, 16.0), (-10.0, 0.0), distortion=(-0.25, 0.06, 0.0, 0.0))
     size, frame = barrel.intrinsics.size, paint_frame(PITCH, barrel)
     sought = SoughtCamera("one", unknown_lenses(size), other_lenses=unknown_lenses(size, OTHER_BENDS))
-    answer = relocalise(PITCH, FieldMap.of(PITCH), sought, Channels([frame]), response_to(frame), 1)
+    answer = search_for(sought, PITCH, frame)
     assert answer.refusal is None, answer.refusal
     assert off_px(PITCH, barrel, answer.candidates[0].camera) < 1.0
 
@@ -105,12 +109,8 @@ def test_other_lenses_are_looked_through_where_the_first_find_nothing():
     wide = replace(lens, matrix=np.diag([0.3, 0.3, 1.0]) @ lens.matrix)
     alone = SoughtCamera("one", [SoughtLens.known(wide)])
     with_other = replace(alone, other_lenses=[SoughtLens.known(lens)])
-    answers = [
-        relocalise(PITCH, FieldMap.of(PITCH), one, Channels([frame]), response_to(frame), 1)
-        for one in (alone, with_other)
-    ]
-    assert answers[0].refusal is not None
-    assert answers[1].refusal is None
+    assert search_for(alone, PITCH, frame).refusal is not None
+    assert search_for(with_other, PITCH, frame).refusal is None
 
 
 @pytest.mark.long
