@@ -35,6 +35,17 @@ def retention(stock, forgotten):
     return Retention(stock.settings, stock.expiry, stock.blobs, stock.workers, forgotten.extend)
 
 
+def failing(call, error, of=""):
+    """A call of the store that fails for paths with `of` in them."""
+
+    def fail(path, *others):
+        if of in path:
+            raise error(path)
+        return call(path, *others)
+
+    return fail
+
+
 @in_both_homes
 def test_frames_go_after_two_days_and_pictures_after_two_weeks(stock, retention):
     failed = stock.ended("a", ago(days=3), accepted=None)
@@ -62,12 +73,8 @@ def test_frames_of_pictures_that_nobody_has_looked_at_stay_as_long_as_pictures(s
 
 def test_frames_that_cannot_be_kept_for_pictures_do_not_go(stock, retention, monkeypatch):
     unseen, later = (stock.ended("a", ago(days=days), accepted=False, drawn=False) for days in (4, 3))
-
-    def away(*_):
-        raise BlobFolderUnavailable("away")
-
     with monkeypatch.context() as outage:
-        outage.setattr(stock.blobs, "move", away)
+        outage.setattr(stock.blobs, "move", failing(stock.blobs.move, BlobFolderUnavailable))
         retention.round(NOW)
     assert stock.files() == {f"frames/{unseen}", f"frames/{later}"}
     retention.round(NOW)
@@ -79,14 +86,7 @@ def test_frames_that_cannot_be_kept_for_pictures_hold_up_no_others(stock, retent
         stock.ended("a", ago(days=3, hours=n), accepted=False, drawn=False) for n in range(AT_ONCE + 2, 0, -1)
     ]
     monkeypatch.setattr("worker.duties.retention.BATCH", AT_ONCE + 2)
-    move = stock.blobs.move
-
-    def refuse(path, to):
-        if stuck in path:
-            raise BlobFolderUnavailable(path)
-        return move(path, to)
-
-    monkeypatch.setattr(stock.blobs, "move", refuse)
+    monkeypatch.setattr(stock.blobs, "move", failing(stock.blobs.move, BlobFolderUnavailable, of=stuck))
     # A full batch, and so at once a further round.
     assert retention.round(NOW)
     gone = {job for job in (stuck, *others) if f"frames/{job}" not in stock.files()}
@@ -160,12 +160,8 @@ def test_a_round_is_bounded_and_says_that_there_is_more(stock, retention, monkey
 
 def test_a_round_that_breaks_off_is_finished_by_the_next(stock, retention, monkeypatch):
     job = stock.ended("a", ago(days=15), accepted=False)
-
-    def killed(_):
-        raise KeyboardInterrupt
-
     with monkeypatch.context() as patch:
-        patch.setattr(stock.blobs, "delete_under", killed)
+        patch.setattr(stock.blobs, "delete_under", failing(stock.blobs.delete_under, KeyboardInterrupt))
         with pytest.raises(KeyboardInterrupt):
             retention.round(NOW)
     # The row promises nothing any more, and the files are on the list.
@@ -178,15 +174,8 @@ def test_a_round_that_breaks_off_is_finished_by_the_next(stock, retention, monke
 def test_a_folder_that_cannot_be_deleted_holds_up_no_other(stock, retention, monkeypatch):
     stuck = stock.ended("a", ago(days=4), accepted=None)
     stock.ended("a", ago(days=3), accepted=None)
-    delete_under = stock.blobs.delete_under
-
-    def refuse(folder):
-        if stuck in folder:
-            raise PermissionError(folder)
-        delete_under(folder)
-
     with monkeypatch.context() as patch:
-        patch.setattr(stock.blobs, "delete_under", refuse)
+        patch.setattr(stock.blobs, "delete_under", failing(stock.blobs.delete_under, PermissionError, of=stuck))
         retention.round(NOW)
     assert stock.files() == {f"frames/{stuck}"}
     retention.round(NOW + timedelta(hours=1))

@@ -40,11 +40,9 @@ def camera(films, missing, monkeypatch):
 
 def measured(tracking):
     """The next pose that was measured."""
-    while True:
-        pose = tracking.poses.get(timeout=90)
-        if pose.tracked.how == "measured":
-            assert turned_deg(pose.tracked.camera, TRUE) < 0.1
-            return pose
+    pose = tracking.pose_of(lambda pose: pose.tracked.how == "measured")
+    assert turned_deg(pose.tracked.camera, TRUE) < 0.1
+    return pose
 
 
 def said(tracking, words):

@@ -46,6 +46,12 @@ class Tracking:
     def __exit__(self, *_):
         self.camera.stop()
 
+    def pose_of(self, reached):
+        """The first pose from now on of which that is true."""
+        while not reached(pose := self.poses.get(timeout=60)):
+            pass
+        return pose
+
 
 def turned_deg(one, other):
     return rotation_angles_deg(one.pose.rotation, other.pose.rotation)
@@ -75,8 +81,7 @@ def test_a_camera_that_took_long_to_be_found_is_tracked_on_from_there(clip, monk
     )
     monkeypatch.setattr(live_tracking, "CameraTracker", lambda *of: found.append(of) or CameraTracker(*of))
     with Tracking(clip) as tracking:
-        while (pose := tracking.poses.get(timeout=60)).number < COUNT - 1:
-            pass
+        pose = tracking.pose_of(lambda pose: pose.number >= COUNT - 1)
     assert len(found) == 1
     assert pose.tracked.how == "measured"
     assert turned_deg(pose.tracked.camera, swung(pose.number)) < 0.02
@@ -88,8 +93,7 @@ def test_a_camera_is_measured_in_a_picture_before_which_none_was_decoded_for_a_s
     monkeypatch.setattr(clips.Clip, "shots", lambda *at: (s for n, s in enumerate(shots(*at)) if n in (0, COUNT - 1)))
     monkeypatch.setattr(StreamClock, "taken_ns", lambda *_: time.time_ns() - 10**9)
     with Tracking(clip) as tracking:
-        while (pose := tracking.poses.get(timeout=60)).number < 1:
-            pass
+        pose = tracking.pose_of(lambda pose: pose.number >= 1)
     assert (pose.tracked.how, pose.clock) == ("measured", "rtcp")
     assert turned_deg(pose.tracked.camera, swung(COUNT - 1)) < 0.02
 
@@ -148,11 +152,7 @@ def test_a_frozen_picture_is_said_and_measured_once(clip, monkeypatch):
 def test_a_stream_that_has_ended_is_opened_again(clip):
     with Tracking(clip) as tracking:
         assert "its stream has ended; it is opened again" in tracking.warnings.get(timeout=60)
-        while tracking.poses.get(timeout=60).number != 0:
-            pass
-        again = tracking.poses.get(timeout=60)
-        while again.number != 0:
-            again = tracking.poses.get(timeout=60)
+        _, again = (tracking.pose_of(lambda pose: pose.number == 0) for _ in range(2))
     assert again.tracked.how == "measured"
 
 

@@ -25,17 +25,26 @@ LIGHTS = {
 }
 
 
+def filmed(frames):
+    return {camera: picture_of(av.VideoFrame.from_ndarray(one, format="bgr24")) for camera, one in frames.items()}
+
+
 def pictures():
-    return {one.id: picture_of(av.VideoFrame.from_ndarray(frame_at(one, 1.0), format="bgr24")) for one in cameras}
+    return filmed({one.id: frame_at(one, 1.0) for one in cameras})
+
+
+def rendered_by(renderer, size, pictures):
+    frame = av.VideoFrame(*size, "yuv420p")
+    frame.colorspace, frame.color_range = 1, 1
+    renderer.render(pictures, planes_of(frame))
+    return Picture(frame).colours.astype(int)
 
 
 def rendered(panorama, pictures):
-    frame = av.VideoFrame(*panorama.size, "yuv420p")
-    frame.colorspace, frame.color_range = 1, 1
     renderer = Renderer(panorama)
-    renderer.render(pictures, planes_of(frame))
+    colours = rendered_by(renderer, panorama.size, pictures)
     renderer.close()
-    return Picture(frame).colours
+    return colours
 
 
 def colours(pictures):
@@ -47,8 +56,8 @@ def colours(pictures):
 @pytest.mark.parametrize("width", [160, 640])
 def test_video_is_the_exact_picture(width, projection, lights):
     shown = panorama(PITCH, chosen_view(PITCH, cameras, ViewChoice(projection, width)), cameras, lights)
-    filmed = pictures()
-    exact, fast = shown.picture(colours(filmed)).astype(int), rendered(shown, filmed).astype(int)
+    seen = pictures()
+    exact, fast = shown.picture(colours(seen)).astype(int), rendered(shown, seen)
     assert np.median(np.abs(fast - exact)) <= 1
     assert np.percentile(np.abs(fast - exact), 90) <= 6
     assert np.abs((fast - exact).mean(axis=(0, 1))).max() < 2
@@ -59,11 +68,8 @@ def test_a_grey_ramp_has_the_tones_of_its_light():
     view = chosen_view(PITCH, cameras, ViewChoice(width=320))
     shown = panorama(PITCH, view, cameras, LIGHTS)
     for level in (20, 100, 180, 230):
-        plain = {
-            one.id: picture_of(av.VideoFrame.from_ndarray(np.full((216, 384, 3), level, np.uint8), format="bgr24"))
-            for one in cameras
-        }
-        exact, fast = shown.picture(colours(plain)).astype(int), rendered(shown, plain).astype(int)
+        plain = filmed({one.id: np.full((216, 384, 3), level, np.uint8) for one in cameras})
+        exact, fast = shown.picture(colours(plain)).astype(int), rendered(shown, plain)
         # Colour at the borders of what is seen is of two by two pixels.
         assert np.percentile(np.abs(fast - exact), 98) <= 3
 
@@ -75,7 +81,7 @@ def test_what_no_camera_sees_is_backdrop_in_every_picture():
     # Colour reaches a few pixels over the border of what is seen.
     inner = cv2.erode((~shown.seen).astype(np.uint8), np.ones((7, 7))) > 0
     assert inner.any()
-    assert np.abs(fast[inner].astype(int) - BACKDROP).max() <= 2
+    assert np.abs(fast[inner] - BACKDROP).max() <= 2
 
 
 def test_its_tables_follow_cameras_that_move():
@@ -88,12 +94,9 @@ def test_its_tables_follow_cameras_that_move():
     assert renderer.fits(moving)
     assert not renderer.fits(turned)
     renderer.move(moving)
-    frame = av.VideoFrame(*view.size, "yuv420p")
-    frame.colorspace, frame.color_range = 1, 1
-    filmed = pictures()
-    renderer.render(filmed, planes_of(frame))
+    found = rendered_by(renderer, view.size, pictures())
     renderer.close()
-    assert np.array_equal(Picture(frame).colours, rendered(moving, filmed))
+    assert np.array_equal(found, rendered(moving, pictures()))
 
 
 def test_odd_sizes_are_refused():
@@ -127,14 +130,6 @@ def people_seams():
     return shown, Renderer(shown, seams=MovingSeams(shown, seam_bands(shown, shows_field(PITCH, view), 25)))
 
 
-def rendered_by(renderer, size, frames):
-    frame = av.VideoFrame(*size, "yuv420p")
-    frame.colorspace, frame.color_range = 1, 1
-    filmed = {camera: picture_of(av.VideoFrame.from_ndarray(one, format="bgr24")) for camera, one in frames.items()}
-    renderer.render(filmed, planes_of(frame))
-    return Picture(frame).colours.astype(int)
-
-
 def with_player(of, x, y):
     """The pitch with somebody in blue."""
     picture = empty(of.id).copy()
@@ -145,7 +140,7 @@ def with_player(of, x, y):
 
 def test_seams_that_move_stay_where_nobody_is():
     shown, moving = people_seams()
-    frames = {one.id: empty(one.id) for one in cameras}
+    frames = filmed({one.id: empty(one.id) for one in cameras})
     difference = np.abs(rendered_by(moving, shown.size, frames) - rendered_by(Renderer(shown), shown.size, frames))
     # Frames are halved as the median of a stretch asks for, and stretches differ.
     assert np.percentile(difference, 98) <= 1
@@ -155,8 +150,8 @@ def test_seams_that_move_stay_where_nobody_is():
 @pytest.mark.parametrize("x", [-0.4, 0.0, 0.4])
 def test_somebody_on_the_seam_is_of_one_camera(x):
     shown, moving = people_seams()
-    rendered_by(moving, shown.size, {one.id: empty(one.id) for one in cameras})
-    frames = {one.id: with_player(one, x, -26.0) for one in cameras}
+    rendered_by(moving, shown.size, filmed({one.id: empty(one.id) for one in cameras}))
+    frames = filmed({one.id: with_player(one, x, -26.0) for one in cameras})
     found, still = rendered_by(moving, shown.size, frames), rendered_by(Renderer(shown), shown.size, frames)
     alone = [
         rendered_by(

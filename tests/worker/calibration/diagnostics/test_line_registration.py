@@ -58,18 +58,18 @@ def seen(lines: MeasuredLines) -> CameraResponse:
     return CameraResponse(lines.camera, BLIND, lambda: pytest.fail("not asked"), lines.measured)
 
 
+def seen_in_place() -> list[CameraResponse]:
+    return [seen(measured(one, one, frame)) for one, frame in zip(pair(), pair_frames(), strict=True)]
+
+
 def test_of_a_pair_that_agrees_the_lines_say_how_far_it_is_apart() -> None:
-    (left, right), frames = pair(), pair_frames()
-    cameras = [seen(measured(left, left, frames[0])), seen(measured(right, right, frames[1]))]
-    by_responses = Pair(left.id, right.id, 0.7, plenty=True, confirmed=True)
-    (by_lines,) = measured_by_lines(CROWNED, [by_responses], cameras)
+    by_responses = Pair("left", "right", 0.7, plenty=True, confirmed=True)
+    (by_lines,) = measured_by_lines(CROWNED, [by_responses], seen_in_place())
     assert by_lines.error_px == registered().error_px
     assert by_lines.registration is not None
 
 
 @pytest.mark.parametrize("error_px", [None, 3.0])
 def test_lines_do_not_gainsay_a_contradiction(error_px) -> None:
-    (left, right), frames = pair(), pair_frames()
-    cameras = [seen(measured(left, left, frames[0])), seen(measured(right, right, frames[1]))]
-    by_responses = Pair(left.id, right.id, error_px, plenty=True, confirmed=False)
-    assert measured_by_lines(CROWNED, [by_responses], cameras) == [by_responses]
+    by_responses = Pair("left", "right", error_px, plenty=True, confirmed=False)
+    assert measured_by_lines(CROWNED, [by_responses], seen_in_place()) == [by_responses]
