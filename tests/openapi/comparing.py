@@ -16,15 +16,8 @@ Document = Mapping[str, Any]
 Direction = Literal["request", "answer"]
 METHODS = ("get", "put", "post", "delete", "patch")
 # By each limit of a schema, which way it is narrowed.
-SMALLEST, LARGEST = (
-    ("minimum", "exclusiveMinimum", "minLength", "minItems"),
-    (
-        "maximum",
-        "exclusiveMaximum",
-        "maxLength",
-        "maxItems",
-    ),
-)
+SMALLEST = ("minimum", "exclusiveMinimum", "minLength", "minItems")
+LARGEST = ("maximum", "exclusiveMaximum", "maxLength", "maxItems")
 
 
 def findings(released: Document, now: Document) -> list[str]:

@@ -92,9 +92,15 @@ def test_what_several_jobs_have_to_say_is_written_in_one_statement(stock, asked,
     assert [stock.jobs.get(task.job_id).progress.fraction for task in tasks] == [0.0, 0.1, 0.2, 0.3, 0.4]
 
 
-def test_an_attempt_that_has_had_its_time_does_not_go_on(stock, monkeypatch):
+@pytest.fixture
+def now(monkeypatch):
+    """The time of the worker, s, as a list of one."""
     now = [100.0]
     monkeypatch.setattr(lease.time, "monotonic", lambda: now[0])
+    return now
+
+
+def test_an_attempt_that_has_had_its_time_does_not_go_on(stock, now):
     task = stock.attempts.begin(stock.submitted("v"))
     with Leases(stock.attempts).begin(task, 60.0) as held:
         held.check()
@@ -103,9 +109,7 @@ def test_an_attempt_that_has_had_its_time_does_not_go_on(stock, monkeypatch):
             held.check()
 
 
-def test_a_lease_is_renewed_however_often_it_is_asked_about(stock, monkeypatch):
-    now = [100.0]
-    monkeypatch.setattr(lease.time, "monotonic", lambda: now[0])
+def test_a_lease_is_renewed_however_often_it_is_asked_about(stock, now):
     task = stock.attempts.begin(stock.submitted("v"))
     with Leases(stock.attempts).begin(task, 60.0) as held:
         held.check()

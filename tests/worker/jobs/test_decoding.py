@@ -19,6 +19,9 @@ pytestmark = pytest.mark.slow
 SCENE = cv2.imread("demo/left.jpg", cv2.IMREAD_REDUCED_COLOR_4)
 
 
+JPEG = cv2.imencode(".jpg", SCENE)[1].tobytes()
+
+
 def as_opencv_reads(file, flags=cv2.IMREAD_COLOR_BGR):
     return cv2.imdecode(np.frombuffer(file, np.uint8), flags | cv2.IMREAD_IGNORE_ORIENTATION)
 
@@ -70,7 +73,7 @@ def test_a_thousand_whole_pictures_are_decoded():
 
 
 def test_a_frame_that_is_damaged_fails_by_the_name_of_its_camera():
-    damaged = damage(cv2.imencode(".jpg", SCENE)[1].tobytes(), "flipped", np.random.default_rng(1))
+    damaged = damage(JPEG, "flipped", np.random.default_rng(1))
     with pytest.raises(JobFailedError, match="camera left is of no use: it is damaged") as failure:
         decode_frame("left", SCENE.shape[1::-1], damaged)
     assert (failure.value.error.type, failure.value.error.camera) == ("/problems/broken-image", "left")
@@ -94,21 +97,18 @@ def test_a_bar_straight_across_the_picture_is_none():
 
 @pytest.mark.parametrize("before", [b"\r\n", b"\xff\xd8"])
 def test_what_cameras_send_around_a_jpeg_does_not_matter(before):
-    whole = cv2.imencode(".jpg", SCENE)[1].tobytes()
-    padded = before + whole[:-2] + bytes(40) + whole[-2:] + b"\r\n--boundary"
-    assert np.array_equal(decode_image("camera left", padded), as_opencv_reads(whole))
+    padded = before + JPEG[:-2] + bytes(40) + JPEG[-2:] + b"\r\n--boundary"
+    assert np.array_equal(decode_image("camera left", padded), as_opencv_reads(JPEG))
 
 
 def test_zeros_in_place_of_the_last_of_a_scan_are_no_padding():
-    whole = cv2.imencode(".jpg", SCENE)[1].tobytes()
     with pytest.raises(DamagedPictureError, match="premature end"):
-        decode_image("camera left", whole[:-4096] + bytes(4094) + whole[-2:])
+        decode_image("camera left", JPEG[:-4096] + bytes(4094) + JPEG[-2:])
 
 
 @pytest.mark.parametrize("tables", ["written", "of the standard"])
 def test_zeros_in_place_of_data_are_no_picture_though_each_is_a_code(tables):
-    whole = cv2.imencode(".jpg", SCENE)[1].tobytes()
-    whole = without_tables(whole) if tables == "of the standard" else whole
+    whole = without_tables(JPEG) if tables == "of the standard" else JPEG
     middle = sum(scan_of(whole)) // 2
     with pytest.raises(DamagedPictureError, match="zeros in place of its data"):
         decode_image("camera left", whole[:middle] + bytes(300) + whole[middle + 300 :])
@@ -167,7 +167,6 @@ def test_the_picture_of_a_png_is_read_and_not_its_animation():
 
 
 def test_scans_are_damaged_where_they_are():
-    whole = cv2.imencode(".jpg", SCENE)[1].tobytes()
-    first, last = scan_of(whole)
+    first, last = scan_of(JPEG)
     assert 300 < first < 1000
-    assert last == len(whole) - 2
+    assert last == len(JPEG) - 2

@@ -8,17 +8,13 @@ from worker.calibration.paper.ground_objective import BROAD, NARROW, GroundObjec
 from worker.calibration.search.genome import genome_of
 
 
-def scene():
-    return pair(), list(pair_markings())
-
-
 def loss(objective, cameras):
     return float(objective.losses(genome_of(cameras)[None])[0])
 
 
 @pytest.mark.parametrize("blurs", try_first([BROAD, NARROW]))
 def test_the_papers_objective_prefers_the_truth_too(blurs):
-    cameras, responses = scene()
+    cameras, responses = pair(), list(pair_markings())
     objective = GroundObjective(CROWNED, cameras, responses, 0.5, blurs)
     truth = loss(objective, cameras)
     assert truth < loss(objective, [moved(c, (0.005, 0, 0)) for c in cameras])
@@ -27,7 +23,7 @@ def test_the_papers_objective_prefers_the_truth_too(blurs):
 
 @pytest.mark.long
 def test_the_papers_objective_sees_a_crown_through_its_planes():
-    cameras, responses = scene()
+    cameras, responses = pair(), list(pair_markings())
     with_roof = GroundObjective(CROWNED, cameras, responses, 0.5, BROAD)
     without = GroundObjective(CROWNED.flat(), cameras, responses, 0.5, BROAD)
     assert loss(with_roof, cameras) < loss(without, cameras)
