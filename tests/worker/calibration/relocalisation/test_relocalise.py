@@ -114,6 +114,12 @@ def test_other_lenses_are_looked_through_where_the_first_find_nothing():
 
 
 @pytest.mark.long
+def test_a_camera_stands_where_it_may():
+    _, _, answer = found("football", "SIDELINE", lens_is_known=True, place=Place("far"))
+    assert answer.candidates[0].camera.pose.position[1] > 0
+
+
+@pytest.mark.long
 def test_three_lines_do_not_tell_a_lens_and_are_refused_with_the_pixels_that_it_leaves_open():
     # One line along padel's service boxes, and what of the lines across it is seen between two markings.
     court = field("padel")
