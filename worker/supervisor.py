@@ -22,8 +22,6 @@ from service.application_state import ApplicationState
 from service.observability import tracing
 from service.queue import GivenUp, WorkerQueue
 from service.schemas.job import JobError
-from service.schemas.names import problem_uri
-from service.schemas.problems import PROBLEM_TYPES
 from service.settings import Settings
 from service.store.database import DATABASE_OUTAGES, without_timeouts
 from service.store.expiry import ExpiryRepository
@@ -196,7 +194,7 @@ class Worker:
             self._queue.forget([job_id])
             self._attempts.enqueue(job_id, stranded, self._enqueue)
             return
-        error = _error("job-abandoned", f"{given_up.why}; see the worker's log.")
+        error = JobError.of("job-abandoned", f"{given_up.why}; see the worker's log.")
         # A slow job may have ended while the queue was asked, or another worker has put it back.
         if self._attempts.abandon(job_id, error, unchanged_s):
             log.error("job given up", job=job_id, why=given_up.why)
@@ -239,7 +237,7 @@ class Worker:
                 log.exception("job broke off")
                 # In the words of the operating system, but not in those of a server.
                 why = str(error) if isinstance(error, OSError) else type(error).__name__
-                crashed = _error("job-crashed", f"The attempt broke off: {why}; see the worker's log.")
+                crashed = JobError.of("job-crashed", f"The attempt broke off: {why}; see the worker's log.")
                 _retry_until(lambda: self._attempts.fail(task, crashed), time.monotonic() + OUTAGE_S)
                 last = Message(error=crashed)
             outcome = {"verdict": "taken away"} if last is None else last.outcome
@@ -255,9 +253,9 @@ class Worker:
         except LeaseLostError:
             return None
         except JobTimeoutError:
-            return Message(error=_error("job-timeout", f"It was ended after {limit_s:g} s; see timeout_s."))
+            return Message(error=JobError.of("job-timeout", f"It was ended after {limit_s:g} s; see timeout_s."))
         except FileUnavailableError as missing:
-            return Message(error=_error(missing.kind, str(missing), missing.camera))
+            return Message(error=JobError.of(missing.kind, str(missing), missing.camera))
 
     def _store_pictures(self, task: Task, last: Message, pictures: dict[str, bytes], lease: Lease) -> Message:
         """Store the pictures. A result outlives pictures that cannot be stored: it gets a warning instead."""
@@ -279,7 +277,7 @@ class Worker:
                 elif message.last:
                     if (fault := fault_in(message, task)) is not None:
                         detail = f"Its program reports what cannot be stored: {fault}. Nothing was stored."
-                        return Message(error=_error("job-crashed", detail)), {}
+                        return Message(error=JobError.of("job-crashed", detail)), {}
                     return message, child.pictures
                 elif message.warning is not None:
                     log.warning("said by its program", what=message.warning)
@@ -287,7 +285,7 @@ class Worker:
                     spans.at(message.progress.stage)
                     lease.report(message.progress)
                     lease.check()
-            return Message(error=_error("job-crashed", child.exit_reason())), {}
+            return Message(error=JobError.of("job-crashed", child.exit_reason())), {}
 
     def _record_end(self, task: Task, last: Message | None) -> None:
         if last is None:
@@ -332,7 +330,3 @@ def _run_with_checks(work: Callable[[], Answer], check: Callable[[], None]) -> A
     while not wait([future], POLL_S).done:
         check()
     return future.result()
-
-
-def _error(kind: str, detail: str, camera: str | None = None) -> JobError:
-    return JobError(type=problem_uri(kind), title=PROBLEM_TYPES[kind].title, detail=detail, camera=camera)

@@ -6,9 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from service.intake.snapshots import Snapshots
 from service.intake.submit import Intake, frame_paths
 from service.schemas.job import Job, JobError
-from service.schemas.names import problem_uri
 from service.schemas.options import Options
-from service.schemas.problems import PROBLEM_TYPES, Problem
+from service.schemas.problems import Problem
 from service.schemas.venue import Venue
 from service.store.blobs import Blobs
 from service.store.ids import new_id
@@ -71,12 +70,7 @@ class FromSources:
 
     def fail(self, venue: Venue, options: Options, key: str | None, origin: Origin, why: Problem) -> Job:
         """Record a failed job for a scheduled calibration whose frames could not be fetched."""
-        error = JobError(
-            type=problem_uri(why.kind),
-            title=PROBLEM_TYPES[why.kind].title,
-            detail=why.detail,
-            camera=why.parts.get("camera"),
-        )
+        error = JobError.of(why.kind, why.detail, why.parts.get("camera"))
         return self._submissions.fail(_submission(venue, options, key, origin, {}), error)
 
 

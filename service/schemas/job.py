@@ -2,13 +2,14 @@
 
 from collections.abc import Iterable
 from datetime import datetime
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import ConfigDict, Field, ValidationInfo, ValidatorFunctionWrapHandler, WrapValidator
 
 from service.schemas.actor import Attributed
 from service.schemas.base import OPEN_WORD, UNREADABLE, Schema, Unreadable, is_empty, is_none, is_tolerant
-from service.schemas.names import OPEN_STATUSES, JobKind, JobStatus
+from service.schemas.names import OPEN_STATUSES, JobKind, JobStatus, problem_uri
+from service.schemas.problems import PROBLEM_TYPES
 from service.schemas.results import AnyResult
 
 
@@ -35,6 +36,11 @@ class JobError(Schema):
     title: str = Field(description="The type in words.")
     detail: str = Field(description="Reason, and what to do.")
     camera: str | None = Field(None, description="Id of the camera that it is about, if it is one.")
+
+    @classmethod
+    def of(cls, kind: str, detail: str, camera: str | None = None) -> Self:
+        """Return the error of a kind of `PROBLEM_TYPES`."""
+        return cls(type=problem_uri(kind), title=PROBLEM_TYPES[kind].title, detail=detail, camera=camera)
 
 
 class CallbackState(Schema):

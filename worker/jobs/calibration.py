@@ -24,7 +24,6 @@ from worker.calibration.gate import quality
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.parameters import field_measures
 from worker.calibration.memory.camera_memory import CameraMemory, memories_of_field
-from worker.calibration.refinement import diagnosis
 from worker.calibration.stitching.photometry import Light
 from worker.compute_resources import ComputeResources
 from worker.jobs.frames_job import FramesJob
@@ -36,6 +35,7 @@ from worker.jobs.to_schemas import (
     Solution,
     camera_to_schema,
     displacement_to_schema,
+    engine_run,
     finite_or_none,
     lens_to_schema,
     light_to_schema,
@@ -87,7 +87,7 @@ def solve(
     """
     job = FramesJob.prepare(venue, files, options, means, report)
     memories = read_memories(nights.memories)
-    with job.engine() as step:
+    with engine_run(job.report) as step:
         found = _method(options)(
             job.pitch,
             job.cameras,
@@ -193,7 +193,7 @@ def _result(
         rejected_because=found.rejected_because,
         cameras=[camera_result(camera) for camera in found.cameras],
         ridge=ridge.tolist() if options.fit_ridge and ridge is not None else None,
-        diagnosis=[_suspicion(one) for one in found.suspicions],
+        diagnosis=[Suspicion.model_validate(one, from_attributes=True) for one in found.suspicions],
         adoptable=_adoptable(venue, found),
         warnings=[*(words for camera in venue.cameras for words in lens_warnings(camera)), *job.remarks],
         stitch_error_px=finite_or_none(found.stitch_error_px),
@@ -207,10 +207,6 @@ def _result(
         cpu_s=round_to_ms(job.spent.core_seconds),
         provenance=job.provenance,
     )
-
-
-def _suspicion(of: diagnosis.Suspicion) -> Suspicion:
-    return Suspicion(camera=of.camera, quantity=of.quantity, deviation=of.deviation, sigma=of.sigma, detail=of.detail)
 
 
 def _adoptable(venue: Venue, found: engine.Calibration) -> list[AdoptableNumber]:

@@ -21,13 +21,12 @@ from worker.jobs.decoding import decode_frames, size_of
 from worker.jobs.from_schemas import JobFailedError, lens_of, pitch_of
 from worker.jobs.to_schemas import (
     Solution,
-    engine_failures,
+    engine_run,
     field_to_schema,
     finite_or_none,
     lens_to_schema,
     load_segmenter,
     pose_to_schema,
-    progress_to_schema,
     round_to_ms,
 )
 
@@ -46,10 +45,8 @@ def solve(
     frames = {camera.id: decode_frames(camera.id, None, files[camera.id], warnings.append) for camera in given.cameras}
     cameras = [_given(camera, size_of(frames[camera.id][0])) for camera in given.cameras]
     pitch = pitch_of(given.field)
-    with engine_failures():
-        checked = check_cameras(
-            pitch, cameras, frames, segmenter, given.seed or 0, lambda step: report(progress_to_schema(step))
-        )
+    with engine_run(report) as step:
+        checked = check_cameras(pitch, cameras, frames, segmenter, given.seed or 0, step)
     graded = [_to_schema(grade(one, _folds(one.meant.intrinsics))) for one in checked]
     fitted = next((one.pitch for one in checked if one.pitch is not pitch), None)
     if fitted is not None:

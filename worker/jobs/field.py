@@ -13,7 +13,14 @@ from worker.calibration.rendering.overlays import overlay
 from worker.compute_resources import ComputeResources
 from worker.jobs.frames_job import FramesJob
 from worker.jobs.from_schemas import encode_jpeg
-from worker.jobs.to_schemas import Solution, camera_to_schema, field_to_schema, finite_or_none, round_to_ms
+from worker.jobs.to_schemas import (
+    Solution,
+    camera_to_schema,
+    engine_run,
+    field_to_schema,
+    finite_or_none,
+    round_to_ms,
+)
 
 log = logging.getLogger(__name__)
 
@@ -27,7 +34,7 @@ def solve(
 ) -> Solution[FieldResult]:
     """Fit the measures of a venue's pitch to the files of its cameras."""
     job = FramesJob.prepare(venue, files, options, means, report)
-    with job.engine() as step:
+    with engine_run(job.report) as step:
         found = fit_field(job.pitch, job.cameras, job.frames, job.network, options.seed or 0, step)
     with job.drawing(found.timings):
         pictures = _draw(job, found)

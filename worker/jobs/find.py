@@ -37,22 +37,14 @@ from worker.calibration.relocalisation.sought import (
 from worker.calibration.rendering.overlays import candidate_picture
 from worker.compute_resources import ComputeResources
 from worker.jobs.decoding import decode_frames, size_of
-from worker.jobs.from_schemas import (
-    Picture,
-    camera_of,
-    encode_jpeg,
-    ignored_areas_of,
-    lens_of,
-    pitch_of,
-)
+from worker.jobs.from_schemas import Picture, camera_of, encode_jpeg, ignored_areas_of, lens_of, pitch_of
 from worker.jobs.to_schemas import (
     Solution,
-    engine_failures,
+    engine_run,
     finite_or_none,
     lens_to_schema,
     load_segmenter,
     pose_to_schema,
-    progress_to_schema,
     provenance_of,
     ridge_to_schema,
     round_to_ms,
@@ -89,10 +81,8 @@ def solve(
     pitch = pitch_of(site.field)
     sought = [sought_camera(one, size_of(frames[one.id][0])) for one in site.cameras if one.pose is None]
     known = [_known(camera) for camera in site.cameras if camera.pose is not None]
-    with engine_failures():
-        found = find_cameras(
-            pitch, sought, known, frames, segmenter, seed, lambda step: report(progress_to_schema(step))
-        )
+    with engine_run(report) as step:
+        found = find_cameras(pitch, sought, known, frames, segmenter, seed, step)
     pictures = {
         name: picture
         for camera in found.cameras

@@ -14,7 +14,6 @@ from service.schemas.options import FieldOptions, Options
 from service.schemas.results import Provenance
 from service.schemas.venue import Camera as VenueCamera
 from service.schemas.venue import Venue
-from worker.calibration import records
 from worker.calibration.detection.segmentation import Segmenter
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.field import Field
@@ -22,13 +21,7 @@ from worker.calibration.records import StageTimings
 from worker.compute_resources import ComputeResources
 from worker.jobs.decoding import decode_frame
 from worker.jobs.from_schemas import Picture, camera_with_ignored_areas, pitch_of
-from worker.jobs.to_schemas import (
-    PREVIEW_FRACTION,
-    engine_failures,
-    load_segmenter,
-    progress_to_schema,
-    provenance_of,
-)
+from worker.jobs.to_schemas import PREVIEW_FRACTION, load_segmenter, provenance_of
 
 Frames = Mapping[str, Sequence[Picture]]
 
@@ -70,12 +63,6 @@ class FramesJob:
         chosen = options.model_dump(mode="json", exclude={"callback_url"})
         provenance = provenance_of(means, segmenter, options.seed or 0, chosen)
         return cls(pitch_of(venue.field), cameras, frames, remarks, segmenter, provenance, spent, report)
-
-    @contextmanager
-    def engine(self) -> Iterator[Callable[[records.Progress], None]]:
-        """Run the engine in the block: yields its progress callback, raises its failures as `JobFailedError`."""
-        with engine_failures():
-            yield lambda step: self.report(progress_to_schema(step))
 
     @contextmanager
     def drawing(self, timings: StageTimings) -> Iterator[None]:

@@ -14,8 +14,6 @@ from service.schemas import geometry, view
 from service.schemas.field import FieldOfPlay
 from service.schemas.geometry import Intrinsics, PosedCamera
 from service.schemas.job import JobError
-from service.schemas.names import problem_uri
-from service.schemas.problems import PROBLEM_TYPES
 from worker.calibration.geometry.camera import Camera, Pose
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.ignored_areas import Ignored
@@ -33,21 +31,12 @@ class JobFailedError(Exception):
 
     def __init__(self, kind: str, detail: str, camera: str | None = None) -> None:
         super().__init__(detail)
-        self.kind, self._detail, self._camera = kind, detail, camera
-
-    @property
-    def error(self) -> JobError:
-        """The error of the job, for the wire."""
-        return JobError(
-            type=problem_uri(self.kind),
-            title=PROBLEM_TYPES[self.kind].title,
-            detail=self._detail,
-            camera=self._camera,
-        )
+        self.kind = kind
+        self.error = JobError.of(kind, detail, camera)
 
     def because(self, why: str) -> JobFailedError:
         """Return the error with its likeliest cause added."""
-        return JobFailedError(self.kind, f"{self._detail} {why[0].upper()}{why[1:]}.", self._camera)
+        return JobFailedError(self.kind, f"{self.error.detail} {why[0].upper()}{why[1:]}.", self.error.camera)
 
 
 def encode_jpeg(picture: Picture, quality: int = JPEG_QUALITY) -> bytes:

@@ -29,7 +29,8 @@ def solve(
     for count, (name, file) in enumerate(files.items()):
         report(Progress(stage="detection", fraction=DETECTION_FRACTION * count / len(files)))
         # One at a time: what is kept of a photo is where the corners are.
-        photos.append(_look(name, file, board))
+        grey = _grey(name, file)
+        photos.append(Photo(name, (grey.shape[1], grey.shape[0]), find_board(grey, board)))
     detected = time.perf_counter()
     if all(photo.detection is None for photo in photos):
         _require_the_right_board(files, board)
@@ -52,11 +53,6 @@ def _board(board: wire.Board) -> Board:
     charuco = board.charuco
     extra = None if charuco is None else Charuco(charuco.dictionary, charuco.marker_m)
     return Board(board.columns, board.rows, board.square_m, extra)
-
-
-def _look(name: str, file: bytes, board: Board) -> Photo:
-    grey = _grey(name, file)
-    return Photo(name, (grey.shape[1], grey.shape[0]), find_board(grey, board))
 
 
 def _grey(name: str, file: bytes) -> Picture:
@@ -88,7 +84,7 @@ def _result(found: LensCalibration, timings_s: Mapping[str, float]) -> Intrinsic
         left_out_px=found.left_out_px,
         sigma=dict(found.sigma),
         spread=dict(found.spread),
-        coverage=CoverageResult(share=found.coverage.share, empty=list(found.coverage.empty)),
+        coverage=CoverageResult.model_validate(found.coverage, from_attributes=True),
         photos=[
             PhotoResult(
                 name=p.name,
@@ -99,7 +95,7 @@ def _result(found: LensCalibration, timings_s: Mapping[str, float]) -> Intrinsic
             )
             for p in found.photos
         ],
-        trials=[LensTrial(terms=list(t.terms), rms_px=t.rms_px, left_out_px=t.left_out_px) for t in found.trials],
+        trials=[LensTrial.model_validate(trial, from_attributes=True) for trial in found.trials],
         warnings=[_sentence(warning) for warning in found.warnings],
         timings_s=round_to_ms(timings_s),
         software=version("esc-calibration"),

@@ -13,8 +13,9 @@ from service.store.jobs.files import BIRDSEYE, OF_CAMERA, STITCHED, names_of_all
 from worker.calibration.diagnostics.markings import MarkingReport
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.field import Field
-from worker.calibration.rendering import layers, stitched_pictures
+from worker.calibration.rendering import layers
 from worker.calibration.rendering.overlays import overlay
+from worker.calibration.rendering.stitched_pictures import birdseye, stitched
 from worker.calibration.stitching.photometry import Light
 from worker.calibration.stitching.views import ViewChoice, chosen_view
 from worker.jobs.from_schemas import Picture, encode_jpeg, encode_png
@@ -50,7 +51,7 @@ def draw(scene: PictureInputs, names: Sequence[str]) -> dict[str, bytes]:
     if {*names} & {*STITCHED}:
         parts.append(partial(_stitched, scene, names))
     if {*names} & {*BIRDSEYE}:
-        parts.append(partial(_birdseye, scene))
+        parts.append(lambda: {"birdseye": encode_jpeg(birdseye(*scene.found, scene.frames, evened=scene.lights))})
     for number, camera in enumerate(scene.stored[1]):
         if {*names} & {f"{kind}_{camera.id}" for kind in OF_CAMERA}:
             parts.append(partial(_of_camera, scene, number, names))
@@ -71,19 +72,14 @@ def _stitched(scene: PictureInputs, names: Sequence[str]) -> dict[str, bytes]:
     wanted = {name: standing for name, standing in standings.items() if name in needed}
     # Somebody may wait, and each of them keeps a core busy.
     with ThreadPoolExecutor(len(wanted)) as both:
-        stitched = both.map(
-            lambda standing: stitched_pictures.stitched(standing[0], view, standing[1], scene.frames, scene.lights),
-            wanted.values(),
+        drawn_in_order = both.map(
+            lambda standing: stitched(standing[0], view, standing[1], scene.frames, scene.lights), wanted.values()
         )
-        drawn = dict(zip(wanted, stitched, strict=True))
+        drawn = dict(zip(wanted, drawn_in_order, strict=True))
     pictures = {name: encode_jpeg(one.picture) for name, one in drawn.items() if name in names}
     if "seam" in names:
         pictures["seam"] = encode_png(layers.seam_layer(drawn["preview"].owner))
     return pictures
-
-
-def _birdseye(scene: PictureInputs) -> dict[str, bytes]:
-    return {"birdseye": encode_jpeg(stitched_pictures.birdseye(*scene.found, scene.frames, evened=scene.lights))}
 
 
 def _of_camera(scene: PictureInputs, number: int, names: Sequence[str]) -> dict[str, bytes]:

@@ -1,6 +1,6 @@
 """Conversion of the engine's answers to models of the wire, and other parts that the kinds of jobs share."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
@@ -36,7 +36,7 @@ from worker.calibration.gate.pairs import Pair
 from worker.calibration.geometry.camera import Camera, Pose
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.lens import Lens
-from worker.calibration.refinement import cross_check, uncertainty
+from worker.calibration.refinement import uncertainty
 from worker.calibration.stitching.photometry import Light
 from worker.compute_resources import ComputeResources
 from worker.jobs.from_schemas import JobFailedError, camera_of
@@ -135,10 +135,10 @@ def load_segmenter(means: ComputeResources) -> Segmenter:
 
 
 @contextmanager
-def engine_failures() -> Iterator[None]:
-    """Raise `JobFailedError` for errors of the engine that explain why the job has no result."""
+def engine_run(report: Callable[[Progress], None]) -> Iterator[Callable[[records.Progress], None]]:
+    """Run the engine in the block: yields its progress callback, raises its failures as `JobFailedError`."""
     try:
-        yield
+        yield lambda step: report(_progress_to_schema(step))
     except records.CalibrationError as error:
         raise JobFailedError(error.kind, error.detail, error.camera) from error
     except ProviderMissing as missing:
@@ -147,23 +147,20 @@ def engine_failures() -> Iterator[None]:
         ) from missing
 
 
-def progress_to_schema(step: records.Progress) -> Progress:
+def _progress_to_schema(step: records.Progress) -> Progress:
     """Return the engine's progress for the wire, with room left for the pictures."""
     return Progress(
         stage=step.stage,
         fraction=min(max(step.fraction, 0.0), PREVIEW_FRACTION),
         generation=step.generation,
         loss=finite_or_none(step.loss),
-        expected_end=None if step.remaining_s is None else _moment_in(step.remaining_s),
+        expected_end=None if step.remaining_s is None else datetime.now(UTC) + timedelta(seconds=step.remaining_s),
     )
-
-
-def _moment_in(seconds: float) -> str:
-    return (datetime.now(UTC) + timedelta(seconds=seconds)).isoformat()
 
 
 def camera_to_schema(found: quality.CameraResult) -> CameraResult:
     """Return the result of a camera by its refinement alone, without what calibrations add from lights and memories."""
+    checked = found.cross_checked()
     return CameraResult(
         id=found.camera.id,
         accepted=found.accepted,
@@ -184,7 +181,7 @@ def camera_to_schema(found: quality.CameraResult) -> CameraResult:
         markings=[_marking(one) for one in found.markings],
         knocked=found.knocked,
         proposed=_proposal(found),
-        cross_check=_cross_check(found.cross_checked()),
+        cross_check=None if checked is None else CrossCheck(apart_m=checked.apart_m, expected_m=checked.expected_m),
     )
 
 
@@ -225,10 +222,6 @@ def displacement_to_schema(pitch: Field, found: quality.CameraResult, anchor: An
         sigma_focal_length=None if moved.focal is None else moved.focal.sigma,
         focal_length_m=moved.focal_shift_m,
     )
-
-
-def _cross_check(found: cross_check.CrossCheck | None) -> CrossCheck | None:
-    return None if found is None else CrossCheck(apart_m=found.apart_m, expected_m=found.expected_m)
 
 
 def _marking(seen: MarkingReport) -> MarkingResult:

@@ -18,14 +18,7 @@ from worker.calibration.rendering.layers import seam_layer
 from worker.calibration.stitching.panorama import Contribution, Panorama, panorama
 from worker.calibration.stitching.views import chosen_view
 from worker.jobs.decoding import decode_frame
-from worker.jobs.from_schemas import (
-    Picture,
-    camera_of,
-    choice_of,
-    encode_jpeg,
-    light_of,
-    pitch_of,
-)
+from worker.jobs.from_schemas import Picture, camera_of, choice_of, encode_jpeg, light_of, pitch_of
 from worker.jobs.jpeg import decode_by_opencv
 from worker.programs.stitch.package import package
 from worker.programs.stitch.scaled import in_scaled, scaled_size
