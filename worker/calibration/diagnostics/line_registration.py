@@ -21,7 +21,7 @@ from worker.calibration.diagnostics.registration import (
     forms_of_both,
     reference_point,
 )
-from worker.calibration.diagnostics.seam import paint_offsets
+from worker.calibration.diagnostics.seam import paint_apart
 from worker.calibration.geometry.camera import Array, Camera
 from worker.calibration.geometry.field import Field
 from worker.calibration.robust import huber_weights
@@ -44,14 +44,9 @@ def register_lines(pitch: Field, first: MeasuredLines, second: MeasuredLines) ->
     if centre is None:
         return None
     lines = pitch.measured_points
-    index, a, b = np.intersect1d(first.measured.index, second.measured.index, return_indices=True)
+    index, apart, sigma = paint_apart(lines, (first.camera, first.measured), (second.camera, second.measured))
     near = np.abs(lines.position[index, :2] - centre).max(axis=1) < FINE_HALF_M
-    (put_first, sigma_first), (put_second, sigma_second) = (
-        paint_offsets(lines, one.camera, one.measured[its[near]]) for one, its in ((first, a), (second, b))
-    )
-    apart, sigma = put_second - put_first, np.hypot(sigma_first, sigma_second)
-    known = np.isfinite(apart) & np.isfinite(sigma)
-    index, apart, sigma = index[near][known], apart[known], sigma[known]
+    index, apart, sigma = index[near], apart[near], sigma[near]
     # The ends of a mark add nothing to its length.
     support_m = int(np.sum(~lines.end_to_end[index])) * lines.spacing
     if support_m < LEAST_SUPPORT_M:

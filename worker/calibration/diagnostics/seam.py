@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from worker.calibration.detection.line_measurement import Measurements
 from worker.calibration.geometry.camera import Array, Camera
@@ -47,12 +48,9 @@ def measure_seam(pitch: Field, first: RefinedPose, second: RefinedPose) -> Seam:
     if first.measured is None or second.measured is None:
         return Seam([])
     lines = pitch.measured_points
-    index, a, b = np.intersect1d(first.measured.index, second.measured.index, return_indices=True)
-    put_first, sigma_first = paint_offsets(lines, first.camera, first.measured[a])
-    put_second, sigma_second = paint_offsets(lines, second.camera, second.measured[b])
-    apart, sigma = put_second - put_first, np.hypot(sigma_first, sigma_second)
+    index, apart, sigma = paint_apart(lines, (first.camera, first.measured), (second.camera, second.measured))
     # Largest sigma of a line that is compared.
-    known = np.isfinite(apart) & (sigma < 0.2)
+    known = sigma < 0.2
     index, apart, sigma = index[known], apart[known], sigma[known]
     most_places = 24
     # Line points (25 cm apart) that make a place of the curve: the fewest with which it has not too many.
@@ -73,10 +71,22 @@ def measure_seam(pitch: Field, first: RefinedPose, second: RefinedPose) -> Seam:
     return Seam(_in_order(places[:most_places]))
 
 
-def paint_offsets(lines: LinePoints, camera: Camera, measured: Measurements) -> tuple[Array, Array]:
-    """Return the offsets (M,) m, along the lines' normals, of the paint by a camera, and their standard deviations."""
-    offset = measured.offset(camera, lines.position[measured.index])
-    return offset / measured.px_per_metre, measured.noise_px / measured.px_per_metre
+def paint_apart(
+    lines: LinePoints, first: tuple[Camera, Measurements], second: tuple[Camera, Measurements]
+) -> tuple[NDArray[np.intp], Array, Array]:
+    """Return the line points (M,) that both cameras have measured, where both distances below are known.
+
+    With each, how far (M,) m along its normal the second camera puts the paint from where the first does, and sigma.
+    """
+    index, *its = np.intersect1d(first[1].index, second[1].index, return_indices=True)
+    puts, sigmas = [], []
+    for (camera, measured), common in zip((first, second), its, strict=True):
+        of_both = measured[common]
+        puts.append(of_both.offset(camera, lines.position[index]) / of_both.px_per_metre)
+        sigmas.append(of_both.noise_px / of_both.px_per_metre)
+    apart, sigma = puts[1] - puts[0], np.hypot(*sigmas)
+    known = np.isfinite(apart) & np.isfinite(sigma)
+    return index[known], apart[known], sigma[known]
 
 
 def _in_order(places: Sequence[SeamPlace]) -> list[SeamPlace]:

@@ -224,8 +224,12 @@ def seam_bands(
         both = made.parts[i].weight[cells] + made.parts[j].weight[cells]
         zone = seen[i] & seen[j] & (both > 0.99) & (nearest == number) & (distances[number] < reach)
         if zone.any():
-            top_left, bottom_right = _with_border(zone)
-            around = slice(top_left[0], bottom_right[0]), slice(top_left[1], bottom_right[1])
+            # A cell more on each side, where there is one.
+            top_to_bottom, left_to_right = (
+                slice(max(part.start - 1, 0), min(part.stop + 1, extent))
+                for part, extent in zip(box(zone), zone.shape, strict=True)
+            )
+            around = top_to_bottom, left_to_right
             in_band, second, on_pitch = (
                 np.ascontiguousarray(mask[around], np.uint8) for mask in (zone, owner == j, pitch[cells])
             )
@@ -254,16 +258,6 @@ def _seam(owner: NDArray[np.int8], pair: tuple[int, int]) -> Mask:
     around = _square(3)
     first, second = (np.asarray(cv2.dilate((owner == number).astype(np.uint8), around), np.uint8) for number in pair)
     return first & second
-
-
-def _with_border(zone: NDArray[np.bool_]) -> tuple[tuple[int, int], tuple[int, int]]:
-    """Return the first and the last row and column of a mask, and a cell more where there is one."""
-    rows, columns = box(zone)
-    height, width = zone.shape
-    return (max(rows.start - 1, 0), max(columns.start - 1, 0)), (
-        min(rows.stop + 1, height),
-        min(columns.stop + 1, width),
-    )
 
 
 def _people(faint: Mask, outright: Mask) -> Mask:
