@@ -89,11 +89,9 @@ class Worker:
         )
         expiry = ExpiryRepository(without_timeouts(home.engine))
         self._retention = Retention(settings, expiry, home.blobs, home.workers, self._queue.forget)
-        self._webhooks = WebhookDelivery(settings, home.outbox, home.jobs, home.events, home.outbox.now)
+        self._webhooks = WebhookDelivery(settings, home, home.outbox.now)
         self._alarms = AlarmTimer(home.venues)
-        self._scheduler = Scheduler(
-            settings, home.schedules, home.venues, home.submissions, home.from_sources, home.disk
-        )
+        self._scheduler = Scheduler(home)
 
     @property
     def was_replaced(self) -> bool:

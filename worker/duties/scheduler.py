@@ -13,20 +13,16 @@ from typing import NoReturn
 
 import structlog
 
-from service.intake.from_sources import FromSources
+from service.application_state import ApplicationState
 from service.intake.snapshots import SourceLate
-from service.observability.disk import Disk
 from service.schemas.job import Job
 from service.schemas.options import Options
 from service.schemas.problems import PROBLEM_TYPES, Problem
 from service.schemas.schedule import Schedule
 from service.schemas.venue import Venue
-from service.settings import Settings
-from service.store.jobs.submission import SubmissionRepository
 from service.store.jobs.task import SCHEDULE, Origin
-from service.store.schedules import Due, Firing, ScheduleRepository
+from service.store.schedules import Due, Firing
 from service.store.unreadable import UnreadableRow
-from service.store.venues import VenueRepository
 from worker.duties.clock_watch import ClockWatch
 from worker.duties.reachability import HostReachability
 from worker.duties.thread_pool import BoundedThreadPool
@@ -59,22 +55,9 @@ class TooSlowError(Exception):
 class Scheduler:
     """Fires schedules that are due by the clock of the database."""
 
-    def __init__(
-        self,
-        settings: Settings,
-        schedules: ScheduleRepository,
-        venues: VenueRepository,
-        submissions: SubmissionRepository,
-        from_sources: FromSources,
-        disk: Disk,
-    ) -> None:
-        self._settings = settings
-        self._schedules = schedules
-        self._venues = venues
-        self._submissions = submissions
-        self._from_sources = from_sources
-        self._disk = disk
-        self._reachability = HostReachability(settings.sources)
+    def __init__(self, home: ApplicationState) -> None:
+        self._home, self._settings, self._schedules = home, home.settings, home.schedules
+        self._reachability = HostReachability(home.settings.sources)
         self._quick = BoundedThreadPool(TRIED_AT_ONCE, "schedule")
         self._quick_fetches = threading.BoundedSemaphore(AT_ONCE)
         self._slow = BoundedThreadPool(AT_ONCE, "slow-schedule")
@@ -102,7 +85,9 @@ class Scheduler:
     def _begin(self, due: Due) -> int:
         """Fire what there is room for; return how many of the quick lane."""
         # What finds no room in the queue would have had its frames fetched in vain.
-        room = self._settings.queue_limit - self._submissions.waiting() - (TRIED_AT_ONCE - self._quick.free_threads)
+        room = (
+            self._settings.queue_limit - self._home.submissions.waiting() - (TRIED_AT_ONCE - self._quick.free_threads)
+        )
         fired = 0
         for lane, waiting, slow in ((self._quick, due.quick, False), (self._slow, due.slow, True)):
             limit = min(room, lane.free_threads)
@@ -118,7 +103,7 @@ class Scheduler:
     def _fire(self, firing: Firing, *, slow: bool) -> None:
         with structlog.contextvars.bound_contextvars(venue=firing.venue_id):
             try:
-                venue = self._venues.get(firing.venue_id)
+                venue = self._home.venues.get(firing.venue_id)
                 if venue is None or venue.schedule is None:
                     return
                 job = self._job(firing, venue, venue.schedule, slow=slow)
@@ -140,7 +125,7 @@ class Scheduler:
 
     def _job(self, firing: Firing, venue: Venue, schedule: Schedule, *, slow: bool) -> Job:
         """Return the submitted job, one that has failed if its frames could not be fetched."""
-        if self._disk.is_short():
+        if self._home.disk.is_short():
             raise DeferredError("Less is free on the disk than must be.")
         if slow:
             return self._fetched_job(firing, venue, schedule, slow=True)
@@ -169,7 +154,7 @@ class Scheduler:
             self._schedules.fetched(firing, slowly=slow and time.monotonic() - begun > quick_s)
 
         try:
-            return self._from_sources.calibrate(
+            return self._home.from_sources.calibrate(
                 venue.id,
                 options,
                 name,
@@ -190,7 +175,7 @@ class Scheduler:
                 self._reachability.note_late(problem.parts["source"])
             if isinstance(problem, SourceLate) and not slow and self._settings.source_timeout_s > QUICK_S:
                 raise TooSlowError from None
-            return self._from_sources.fail(venue, options, name, origin, problem)
+            return self._home.from_sources.fail(venue, options, name, origin, problem)
 
 
 def _in_words(problem: Problem) -> str:

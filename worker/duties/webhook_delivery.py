@@ -16,9 +16,8 @@ import structlog
 from service.schemas.events.venue_event import Event
 from service.schemas.job import JobEvent
 from service.settings import Settings
-from service.store.events.feed import EventRepository
-from service.store.events.outbox import Delivery, OutboxRepository
-from service.store.jobs.queries import JobRepository
+from service.store.events.outbox import Delivery
+from service.store.repositories import Repositories
 from service.store.unreadable import UnreadableRow
 from worker.duties import webhook_request
 from worker.duties.clock_watch import ClockWatch
@@ -43,19 +42,8 @@ log = structlog.get_logger()
 class WebhookDelivery:
     """Sends the deliveries that are due by the clock `now`."""
 
-    def __init__(
-        self,
-        settings: Settings,
-        deliveries: OutboxRepository,
-        jobs: JobRepository,
-        following: EventRepository,
-        now: Callable[[], datetime],
-    ) -> None:
-        self._settings = settings
-        self._deliveries = deliveries
-        self._jobs = jobs
-        self._following = following
-        self._now = now
+    def __init__(self, settings: Settings, home: Repositories, now: Callable[[], datetime]) -> None:
+        self._settings, self._home, self._now = settings, home, now
         self._tls = httpx.create_ssl_context()
         self._senders = BoundedThreadPool(AT_ONCE, "callback")
         self._clock = ClockWatch()
@@ -67,10 +55,10 @@ class WebhookDelivery:
             return POLL_S
         now = self._now()
         if self._clock.was_put_back(now):
-            wrong = self._deliveries.repair_due_times(now, now + ATTEMPT, LONGEST_WAITS)
+            wrong = self._home.outbox.repair_due_times(now, now + ATTEMPT, LONGEST_WAITS)
             if wrong:
                 log.warning("the clock was put back, callbacks are due anew", callbacks=wrong)
-        due = self._deliveries.claim_due(now, now + ATTEMPT, self._senders.free_threads, self._senders.busy_by_owner)
+        due = self._home.outbox.claim_due(now, now + ATTEMPT, self._senders.free_threads, self._senders.busy_by_owner)
         for delivery in due:
             self._senders.begin(partial(self._attempt, delivery), delivery.receiver)
         if not due and self._senders.free_threads == AT_ONCE:
@@ -104,7 +92,7 @@ class WebhookDelivery:
                 self._failed(delivery, type(error).__name__)
                 return
             if 200 <= answer.status < 300:
-                self._deliveries.mark_delivered(delivery)
+                self._home.outbox.mark_delivered(delivery)
                 log.info("callback delivered")
             elif answer.status == GONE:
                 self._give_up(delivery, "its receiver is gone (410)")
@@ -114,8 +102,8 @@ class WebhookDelivery:
     def _event(self, delivery: Delivery) -> Event | None:
         """Return what a delivery tells; None if its event or job is no longer kept."""
         if delivery.event is not None:
-            return self._following.get(delivery.event)
-        job = self._jobs.get(delivery.id)
+            return self._home.events.get(delivery.event)
+        job = self._home.jobs.get(delivery.id)
         return None if job is None else JobEvent.of(job)
 
     def _send(self, delivery: Delivery, body: bytes) -> webhook_request.WebhookResponse:
@@ -128,11 +116,11 @@ class WebhookDelivery:
             self._give_up(delivery, why)
             return
         pause_s = max(PAUSES_S[delivery.attempt - 1], min(asked_s, LONGEST_ASKED_S)) * random.uniform(1, 1 + JITTER)
-        self._deliveries.retry_later(delivery, self._now() + timedelta(seconds=pause_s), why)
+        self._home.outbox.retry_later(delivery, self._now() + timedelta(seconds=pause_s), why)
         log.warning("callback failed", why=why, again_in_s=round(pause_s))
 
     def _give_up(self, delivery: Delivery, why: str) -> None:
-        self._deliveries.give_up(delivery, why)
+        self._home.outbox.give_up(delivery, why)
         log.error("callback given up", why=why)
 
 

@@ -52,12 +52,7 @@ def app(home, tmp_path, monkeypatch):
 
 @pytest.fixture
 def duty(app):
-    return scheduler_of(app)
-
-
-def scheduler_of(app):
-    made = app
-    return Scheduler(made.settings, made.schedules, made.venues, made.submissions, made.from_sources, made.disk)
+    return Scheduler(app)
 
 
 def put(app, name, options=None, alarms=None, source="http://127.0.0.1/x", **more):
@@ -352,7 +347,7 @@ def quick_fetches(app, monkeypatch):
 
 
 def fire_until_a_job_waits(app):
-    duty = scheduler_of(app)
+    duty = Scheduler(app)
     all_due(app)
     assert [job.venue for job in poll_until(duty, lambda: waiting(app))] == ["z-live"]
     duty.finish()
@@ -424,7 +419,7 @@ def test_schedules_that_a_clock_was_ahead_for_fire_at_their_next_time(app, duty)
     # As a worker left them whose clock was six hours ahead: one waits for its next time, the other was being fired.
     set_times(app, "waits", due_at=now + hours, look_at=now + hours)
     set_times(app, "claimed", due_at=now - timedelta(minutes=1), look_at=now + hours)
-    restarted = scheduler_of(app)
+    restarted = Scheduler(app)
     look(restarted)
     assert [job.venue for job in waiting(app)] == ["claimed"]
     for name in ("waits", "claimed"):

@@ -60,7 +60,7 @@ def stock(home, tmp_path):
 
 
 def callbacks(stock, clock) -> WebhookDelivery:
-    return WebhookDelivery(stock.settings, stock.outbox, stock.jobs, stock.events, clock)
+    return WebhookDelivery(stock.settings, stock, clock)
 
 
 def look(sender: WebhookDelivery) -> None:
