@@ -7,9 +7,6 @@ same reason.
 
 import socket
 import threading
-from collections.abc import Mapping
-from contextlib import AbstractAsyncContextManager
-from importlib.metadata import version
 
 import httpx
 
@@ -65,14 +62,3 @@ def failure_text(error: httpx.HTTPError) -> str:
             return "no whole answer by HTTP: it speaks another protocol, or the connection broke off"
         case _:
             return f"no answer that can be read ({type(error).__name__})"
-
-
-def post(
-    client: httpx.AsyncClient, target: httpx.URL, address: str, content: bytes, headers: Mapping[str, str]
-) -> AbstractAsyncContextManager[httpx.Response]:
-    """POST to the host of a URL at one of its addresses; the response streams."""
-    head = {**headers, "Host": target.netloc.decode("ascii"), "User-Agent": f"esc/{version('esc-calibration')}"}
-    # The certificate is checked against the name, whatever address the connection goes to.
-    name = {"sni_hostname": target.raw_host.decode("ascii")}
-    at = target.copy_with(host=address)
-    return client.stream("POST", at, content=content, headers=head, extensions=name)

@@ -9,7 +9,6 @@ import numpy as np
 
 from service.schemas.check import GRADES, CameraCheck, CheckCause, CheckedCamera, CheckedFile, CheckResult
 from service.schemas.frame_sizes import is_resized, other_shape
-from service.schemas.geometry import Pose
 from service.schemas.job import Progress
 from service.schemas.lens_map import LEAST_BLIND_SHARE, map_of, times_larger
 from worker.calibration.checking.check import GivenCamera, check_cameras
@@ -18,7 +17,7 @@ from worker.calibration.geometry import camera as engine
 from worker.calibration.geometry.lens import Lens
 from worker.compute_resources import ComputeResources
 from worker.jobs.decoding import decode_frames, size_of
-from worker.jobs.from_schemas import JobFailedError, lens_of, pitch_of
+from worker.jobs.from_schemas import JobFailedError, lens_of, pitch_of, pose_of
 from worker.jobs.to_schemas import (
     Solution,
     engine_run,
@@ -76,7 +75,7 @@ def _given(camera: CheckedCamera, size: tuple[int, int]) -> GivenCamera:
         lens = replace(lens.scaled(size[0] / written_for[0]), size=size)
     larger = times_larger(camera.intrinsics.matrix, written_for)
     resized = None if larger is None else replace(lens.scaled(larger), size=size)
-    pose = NO_POSE if camera.pose is None else _pose(camera.pose)
+    pose = NO_POSE if camera.pose is None else pose_of(camera.pose)
     return GivenCamera(
         engine.Camera(camera.id, lens, pose), written_for != size, resized, _reordered(lens), camera.pose is not None
     )
@@ -90,10 +89,6 @@ def _reordered(lens: Lens) -> Lens | None:
 
 
 NO_POSE = engine.Pose(np.zeros(3), np.zeros(3))
-
-
-def _pose(pose: Pose) -> engine.Pose:
-    return engine.Pose(np.array(pose.rotation), np.array(pose.position))
 
 
 def _folds(lens: Lens) -> str | None:

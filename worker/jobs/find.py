@@ -101,12 +101,9 @@ def sought_camera(camera: SoughtCameraIn, size: tuple[int, int]) -> SoughtCamera
         return SoughtCamera(camera.id, _panoramas(camera.panorama, size, camera.field_of_view_deg), place, ignored)
     if camera.intrinsics is not None:
         lens = lens_of(camera.intrinsics, list(size))
-        if isinstance(lens, Panorama):
-            sigma = free_lens_sigma(lens) | dict(lens.sigma)
-            around = SoughtLens.around(lens, sigma["fx"] / lens.focal_length_px)
-            return SoughtCamera(camera.id, [around], place, ignored)
-        known = SoughtLens.around(lens, lens.sigma.get("fx", 0.0) / lens.focal_length_px)
-        return SoughtCamera(camera.id, [known], place, ignored)
+        usual = free_lens_sigma(lens) if isinstance(lens, Panorama) else {}
+        sigma_px = lens.sigma.get("fx", usual.get("fx", 0.0))
+        return SoughtCamera(camera.id, [SoughtLens.around(lens, sigma_px / lens.focal_length_px)], place, ignored)
     if camera.field_of_view_deg is not None:
         of_view = partial(lenses_of_view, size, camera.field_of_view_deg, FIELD_OF_VIEW_UNCERTAIN)
         return SoughtCamera(camera.id, of_view(BENDS), place, ignored, of_view(OTHER_BENDS))

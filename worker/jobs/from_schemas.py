@@ -69,10 +69,14 @@ def lens_of(lens: Intrinsics, image_size: list[int]) -> Lens:
     return LENSES[lens.model](matrix, distortion, size, dict(lens.sigma or {}), lens.sigma_from)
 
 
+def pose_of(pose: geometry.Pose) -> Pose:
+    """Return the engine's pose."""
+    return Pose(np.array(pose.rotation), np.array(pose.position))
+
+
 def camera_of(camera: PosedCamera) -> Camera:
     """Return the engine's camera at its stored pose."""
-    pose = Pose(np.array(camera.pose.rotation), np.array(camera.pose.position))
-    return Camera(camera.id, lens_of(camera.intrinsics, camera.image_size), pose)
+    return Camera(camera.id, lens_of(camera.intrinsics, camera.image_size), pose_of(camera.pose))
 
 
 def choice_of(choice: view.ViewChoice) -> ViewChoice:

@@ -23,7 +23,8 @@ from worker.jobs.to_schemas import Solution
 LEAST_OFF, NEARER = 0.02, 0.4
 """A fitted focal length that is off its own lens by more than the first part of it, and off another's by less than the
 second part of that, is called nearer to the other's."""
-Ended = dict[str, Solution[LocateResult] | JobFailedError]
+Ended = Solution[LocateResult] | JobFailedError
+"""First pose of a camera, or why it has none."""
 
 
 def locate_all(
@@ -32,9 +33,9 @@ def locate_all(
     points: Mapping[str, list[ClickedPoint]],
     frames: Mapping[str, bytes],
     stored: Mapping[str, Pose],
-) -> Ended:
+) -> dict[str, Ended]:
     """The first pose of each camera that has a lens, or why it has none; by camera, as all but the field."""
-    ended: Ended = {}
+    ended: dict[str, Ended] = {}
     for camera, lens in lenses.items():
         try:
             ended[camera] = locate(camera, field, lens, points[camera], frames.get(camera), lambda _: None, stored)
@@ -54,9 +55,7 @@ def locate_all(
     return {camera: _compared(camera, end, lenses) for camera, end in ended.items()}
 
 
-def _compared(
-    camera: str, end: Solution[LocateResult] | JobFailedError, lenses: Mapping[str, Lens]
-) -> Solution[LocateResult] | JobFailedError:
+def _compared(camera: str, end: Ended, lenses: Mapping[str, Lens]) -> Ended:
     """The end of a camera with a warning where the lens that was fitted to its points is nearer to another camera's."""
     if isinstance(end, JobFailedError) or end.result.lens is None or not end.result.accepted:
         return end
@@ -73,7 +72,7 @@ def _compared(
     return Solution(end.result.model_copy(update={"warnings": [*end.result.warnings, hint]}), end.pictures)
 
 
-def _misfit(end: Solution[LocateResult] | JobFailedError) -> str | None:
+def _misfit(end: Ended) -> str | None:
     """Return in words how badly points and lens of a camera fit each other, or None if they fit."""
     if isinstance(end, JobFailedError):
         return "no pose" if end.kind == "no-pose" else None
@@ -96,7 +95,7 @@ def _rms_px(field: FieldOfPlay, camera: str, points: Mapping[str, list[ClickedPo
     return found.rms_px if found.lens is None and found.rejected_because is None else None
 
 
-def _refused(end: Solution[LocateResult] | JobFailedError, why: str) -> Solution[LocateResult] | JobFailedError:
+def _refused(end: Ended, why: str) -> Ended:
     if isinstance(end, JobFailedError):
         return end.because(why)
     result = end.result.model_copy(update={"accepted": False, "rejected_because": why})

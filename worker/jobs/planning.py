@@ -48,7 +48,7 @@ from worker.calibration.planning.variations import (
 from worker.calibration.planning.warnings import REFUSED, PlanWarning, find_warnings
 from worker.calibration.refinement.uncertainty import Sigma
 from worker.calibration.rendering.plan_maps import COVERAGE, PLACE, RESOLUTION, Scale, plan_map
-from worker.jobs.from_schemas import encode_png, ignored_areas_of, lens_of, pitch_of
+from worker.jobs.from_schemas import encode_png, ignored_areas_of, lens_of, pitch_of, pose_of
 
 WORST = 0.95
 """Part of the field in view that is at least as good as its "worst" place."""
@@ -129,8 +129,7 @@ def _lens(given: PlannedCameraIn) -> Lens:
 
 def _pose(pitch: Field, given: PlannedCameraIn) -> Pose:
     if given.pose is not None:
-        stored = PoseSchema.from_input(given.pose)
-        return Pose(np.array(stored.rotation), np.array(stored.position))
+        return pose_of(PoseSchema.from_input(given.pose))
     position = np.array(given.position, dtype=float)
     if given.look_at is not None:
         return Pose.looking_at(position, pitch.lift(np.array(given.look_at)), -given.roll_deg)

@@ -46,7 +46,7 @@ class Relay:
     def __init__(self, target: httpx.URL, addresses: Sequence[str], userinfo: str | None) -> None:
         self._target = target
         self._addresses = addresses
-        self._authorization = Authorization(userinfo)
+        self.authorization = Authorization(userinfo)
         # Other users of this machine reach the port as well.
         self._token = secrets.token_urlsafe(16)
         self._loop = asyncio.new_event_loop()
@@ -139,15 +139,6 @@ class Relay:
         there = f"{self._target.scheme}://{self._target.netloc.decode('ascii')}"
         return replace(request, first=request.first.replace(self._here, there, 1))
 
-    def signed(self, request: Message) -> str | None:
-        """Return the credentials of a request, where the camera has asked for them."""
-        words = request.first.split()
-        return self._authorization.header(words[0], words[1]) if len(words) > 1 else None
-
-    def choose_signature(self, asked: Message, tried: Sequence[str]) -> str | None:
-        """Take in how a 401 asks for a user; return the name of the way that is signed by, None if there is none."""
-        return self._authorization.choose(asked.all("WWW-Authenticate"), tried)
-
     def failed(self, why: str) -> None:
         """Keep what the camera answered, for whoever asks why there is no stream."""
         self._why = why
@@ -188,7 +179,8 @@ class _Talk:
 
     async def _ask(self, sent: _Sent) -> None:
         self._number += 1
-        signature = self._relay.signed(sent.request)
+        method, uri, *_ = (*sent.request.first.split(), "", "")
+        signature = self._relay.authorization.header(method, uri) if uri else None
         signed = sent.request.having("CSeq", str(self._number))
         if signature is not None:
             signed = signed.having("Authorization", signature)
@@ -203,7 +195,7 @@ class _Talk:
         if 300 <= status < 400:
             raise CameraError(redirect_in_words(response, f"it answered {status} to {method} and leads"))
         if status == UNAUTHORIZED:
-            way = self._relay.choose_signature(response, sent.tried)
+            way = self._relay.authorization.choose(response.all("WWW-Authenticate"), sent.tried)
             if way is not None:
                 await self._ask(replace(sent, tried=(*sent.tried, way)))
                 return

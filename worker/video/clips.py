@@ -209,7 +209,9 @@ class Clip:
     def _time(self, at: float, taken_ns: int | None) -> float | None:
         """Return the clip's time of a picture, `at` in its own; None while cameras have not reported their clocks."""
         if self._clocks is None:
-            self._zero = at - self._lateness() if self._zero is None else self._zero
+            if self._zero is None:
+                # Live streams that are opened one after the other are in time by when their pictures arrive.
+                self._zero = at - (time.monotonic() - self.since if self.live else 0.0)
             return at - self._zero
         if not self._clocks.report(self.camera, taken_ns) or taken_ns is None:
             return None
@@ -217,10 +219,6 @@ class Clip:
         # Sound has no clock of its own.
         self._zero = at - time_s
         return time_s
-
-    def _lateness(self) -> float:
-        """Live streams that are opened one after the other are in time by when their pictures arrive."""
-        return time.monotonic() - self.since if self.live else 0.0
 
     def _packets(self) -> Iterator[Packet[AudioStream] | Packet[VideoStream]]:
         import av

@@ -84,16 +84,6 @@ class _ArrivedPicture:
     shows_new: bool
     is_frozen: bool
 
-    @property
-    def delay_s(self) -> float | None:
-        """Seconds from when a prompt picture is taken to its arrival, by both clocks; None if its time is unknown."""
-        return None if self.taken_ns is None else (self.arrived_ns - self.taken_ns) / 1e9 - self.late_s
-
-    @property
-    def clock_offset_s(self) -> float | None:
-        """Camera's clock less the time in its stream (s), which only changes if that clock is set."""
-        return None if self.taken_ns is None else self.taken_ns / 1e9 - self.stream_s
-
 
 class _NewestPicture:
     """The pictures of a clip as they arrive, decoded in a thread; who comes late gets the newest.
@@ -263,18 +253,19 @@ class StreamTracker:
     def _report(self, tracked: TrackedPose, arrived: _ArrivedPicture, rate: Fraction) -> None:
         clock: Clock = "arrival"
         at_ns = arrived.arrived_ns
-        if arrived.taken_ns is not None and self._is_clock_plausible(arrived):
+        if arrived.taken_ns is not None and self._is_clock_plausible(arrived, arrived.taken_ns):
             clock, at_ns = "rtcp", arrived.taken_ns
         if tracked.how == "measured" and tracked.sigma.rotation_deg < UNSURE_DEG:
             self._unseen_since = None
         ahead_ns = int(self.ahead_s * 1e9)
         self.report(LivePose(tracked, at_ns + ahead_ns, clock, arrived.arrived_ns, arrived.number, rate))
 
-    def _is_clock_plausible(self, arrived: _ArrivedPicture) -> bool:
+    def _is_clock_plausible(self, arrived: _ArrivedPicture, taken_ns: int) -> bool:
         """Return True if the camera's clock is plausible for a picture; report changes of that."""
-        delay_s, offset_s = arrived.delay_s, arrived.clock_offset_s
-        if delay_s is None or offset_s is None:
-            return False
+        # From when a prompt picture is taken to its arrival, by both clocks.
+        delay_s = (arrived.arrived_ns - taken_ns) / 1e9 - arrived.late_s
+        # The camera's clock less the time in its stream, which only changes if that clock is set.
+        offset_s = taken_ns / 1e9 - arrived.stream_s
         was_right, self._is_clock_right = self._is_clock_right, EARLIEST_S <= delay_s <= LATEST_S
         set_by_s = 0.0 if self._clock_offset_s is None else offset_s - self._clock_offset_s
         self._clock_offset_s = offset_s

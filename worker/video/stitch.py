@@ -16,9 +16,6 @@ from itertools import takewhile
 from math import inf
 from typing import TYPE_CHECKING, ClassVar, Literal, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.field import Field
 from worker.calibration.stitching.coverage import Unseen, unseen_part
@@ -223,8 +220,14 @@ def stitch(
         sound = None if sound_clip is None else Sound(sound_clip, moments.begin_s - offsets[sound_clip.camera])
         with Writer(plan.output, view.size, rate, plan.encoding, sound) as writer:
             on_pitch = shows_field(scene.pitch, view) if plan.seam == "people" else None
-            renderers = RendererFactory(on_pitch, float(rate), plan.threads, max(follow.border, MODEL.frame_border))
-            for made in _rendered(moments, geometry, view.size, writer, renderers):
+
+            def renderer_of(made: Panorama) -> Renderer:
+                if on_pitch is None:
+                    return Renderer(made, plan.threads)
+                bands = seam_bands(made, on_pitch, float(rate), max(follow.border, MODEL.frame_border))
+                return Renderer(made, plan.threads, MovingSeams(made, bands))
+
+            for made in _rendered(moments, geometry, view.size, writer, renderer_of):
                 if moments.count == 1:
                     begun(unseen_part(made.seen))
                 report(f"{moments.count / (time.monotonic() - started):.1f} fps", min(1.0, moments.count / expected))
@@ -241,29 +244,12 @@ def stitch(
     )
 
 
-@dataclass(frozen=True)
-class RendererFactory:
-    """Makes renderers of panoramas.
-
-    `on_pitch` (H, W): `shows_field`, if seams go around people; `border`: of frames, that is not shown
-    then, in their widths.
-    """
-
-    on_pitch: NDArray[np.bool_] | None
-    rate: float
-    threads: int
-    border: float
-
-    def __call__(self, panorama: Panorama) -> Renderer:
-        """Return the renderer of a panorama."""
-        if self.on_pitch is None:
-            return Renderer(panorama, self.threads)
-        seams = MovingSeams(panorama, seam_bands(panorama, self.on_pitch, self.rate, self.border))
-        return Renderer(panorama, self.threads, seams)
-
-
 def _rendered(
-    moments: "ClipMoments", geometry: Geometry, size: tuple[int, int], writer: Writer, renderers: RendererFactory
+    moments: "ClipMoments",
+    geometry: Geometry,
+    size: tuple[int, int],
+    writer: Writer,
+    renderer_of: Callable[[Panorama], Renderer],
 ) -> Iterator[Panorama]:
     """Make and write the view of each moment, which `moments` counts; yield its panorama."""
     import av
@@ -279,7 +265,7 @@ def _rendered(
             else:
                 if renderer is not None:
                     renderer.close()
-                renderer = renderers(now)
+                renderer = renderer_of(now)
             before = now
             frame = av.VideoFrame(*size, "yuv420p")
             renderer.render(pictures, planes_of(frame))

@@ -44,14 +44,10 @@ def _to_planes() -> Array:
     return np.column_stack([rows, [BLACK, NO_COLOUR, NO_COLOUR]])
 
 
-def _from_planes(to_planes: Array) -> Array:
-    """Return the matrix (3, 4) from luma, both chroma, 1 to blue, green, red."""
-    inverse = np.linalg.inv(to_planes[:, :3])
-    return np.column_stack([inverse, -inverse @ to_planes[:, 3]])
-
-
 TO_PLANES = _to_planes()
-FROM_PLANES = _from_planes(TO_PLANES)
+_INVERSE = np.linalg.inv(TO_PLANES[:, :3])
+FROM_PLANES = np.column_stack([_INVERSE, -_INVERSE @ TO_PLANES[:, 3]])
+"""Matrix (3, 4) from luma, both chroma, 1 to blue, green, red."""
 
 
 @dataclass(frozen=True)

@@ -83,13 +83,6 @@ def require_a_plane(clicks: Clicks, lens: Lens) -> None:
         raise UndeterminedPoseError(f"all {every.of} {every.lie}: {every.add}")
 
 
-def require_more_than_a_line(clicks: Clicks) -> None:
-    """Refuse clicks of which all but one lie on a line, where no pose was found that explains them."""
-    line = clicks.on_one_line()
-    if line is not None:
-        raise UndeterminedPoseError(line)
-
-
 def _line(clicks: Clicks) -> _Line | None:
     # Ratio of width to length of a set of points below which they are a line.
     collinear = 0.01

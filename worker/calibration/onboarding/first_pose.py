@@ -10,12 +10,7 @@ from collections.abc import Mapping, Sequence
 
 from worker.calibration.geometry.camera import Array, Camera
 from worker.calibration.geometry.lens import Lens
-from worker.calibration.onboarding.clicks import (
-    Clicks,
-    UndeterminedPoseError,
-    require_a_plane,
-    require_more_than_a_line,
-)
+from worker.calibration.onboarding.clicks import Clicks, UndeterminedPoseError, require_a_plane
 from worker.calibration.onboarding.exchanged_labels import exchange_labels
 from worker.calibration.onboarding.first_pose_verdict import HEIGHTS_M, LARGEST_RMS_PX, FirstPose, judge_first_pose
 from worker.calibration.onboarding.freed_lens import free_lens
@@ -34,7 +29,8 @@ def first_pose(clicks: Clicks, lens: Lens, landmarks: Mapping[str, Array], name:
     require_a_plane(clicks, lens)
     fits = _candidates(clicks, lens, name)
     if not fits or _needs_explaining(fits[0]):
-        require_more_than_a_line(clicks)
+        if (line := clicks.on_one_line()) is not None:
+            raise UndeterminedPoseError(line)
         _require_not_mirrored(fits, clicks, lens, name)
     if not fits:
         raise UndeterminedPoseError(

@@ -77,7 +77,9 @@ class GroundObjective:
             _Warp.build(grid, _PinholeView.build(camera, response), domain)
             for camera, response, domain in zip(cameras, responses, domains, strict=True)
         ]
-        self.half_heights = _half_heights(pitch.line_width, blurs)
+        widths_px = np.array([pitch.line_width * PIXELS_PER_METRE / 2**number for number in range(1, blurs.count + 1)])
+        # Half of the brightness, of 255, of a line of the field after each blur.
+        self.half_heights = [255 * height / 2 for height in blurred_line(widths_px, blurs.sigma_px)]
         self.templates = [self._thickened(lines & domain) for domain in domains]
         self.around = [_widened(template) for template in self.templates]
         self.pairs = {
@@ -134,12 +136,6 @@ def _pyramid(picture: Picture, count: int) -> Iterator[Grey]:
         yield coarse
 
 
-def _half_heights(line_width: float, blurs: Blurs) -> list[float]:
-    """Return half of the brightness, of 255, of a line `line_width` metres broad after each blur."""
-    widths = np.array([line_width * PIXELS_PER_METRE / 2**number for number in range(1, blurs.count + 1)])
-    return [255 * height / 2 for height in blurred_line(widths, blurs.sigma_px)]
-
-
 def _coarsened(domain: Picture, count: int) -> list[Picture]:
     """Return a mask (H, W) on the grids of `count` blurs."""
     return [_above(coarse, 255 / 2) for coarse in _pyramid(domain, count)]
@@ -155,12 +151,8 @@ def _widened(template: Sequence[Picture]) -> list[Picture]:
 
 def _unlike(a: Sequence[Picture], b: Sequence[Picture]) -> float:
     """Return 1 - IoU of two binary pictures, the mean over their blurs."""
-    return float(np.mean([_unlike_once(*pair) for pair in zip(a, b, strict=True)]))
-
-
-def _unlike_once(a: Picture, b: Picture) -> float:
-    either = cv2.countNonZero(a | b)
-    return 1.0 - cv2.countNonZero(a & b) / either if either else 1.0
+    both = [(cv2.countNonZero(one & other), cv2.countNonZero(one | other)) for one, other in zip(a, b, strict=True)]
+    return float(np.mean([1.0 - common / either if either else 1.0 for common, either in both]))
 
 
 def _within(pictures: Sequence[Picture], domain: Sequence[Picture]) -> list[Picture]:
@@ -321,9 +313,7 @@ def _distinct_rows(rows: Array) -> tuple[Array, NDArray[np.intp]]:
 
     np.unique sorts numbers twenty times as fast as rows.
     """
-    columns = [np.unique(column) for column in rows.T]
-    sizes = tuple(len(values) for values in columns)
-    places = [np.searchsorted(values, column) for values, column in zip(columns, rows.T, strict=True)]
-    codes, counts = np.unique(np.ravel_multi_index(places, sizes), return_counts=True)
-    kept = zip(columns, np.unravel_index(codes, sizes), strict=True)
-    return np.stack([values[at] for values, at in kept], axis=1), counts
+    places = [np.unique(column, return_inverse=True)[1] for column in rows.T]
+    codes = np.ravel_multi_index(places, [int(place.max()) + 1 for place in places])
+    _, first, counts = np.unique(codes, return_index=True, return_counts=True)
+    return rows[first], counts

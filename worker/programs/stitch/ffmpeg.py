@@ -155,13 +155,14 @@ def _evened_out(camera: _Camera, maps: Mapping[str, str]) -> list[str]:
     least, largest = camera.rises
     # Darker meanwhile, so that nothing is clipped before it is done: a step is then a little more than a grey level.
     headroom = largest * max(1.0, *camera.light.gain)
+    brighter = f"'val*{headroom:.6f}+0.5'"
     return [
         f"[{camera.id} seen]split[{camera.id} one][{camera.id} other]",
         f"[{camera.id} one]{_tones(camera.light, least / headroom)}[{camera.id} least]",
         f"[{camera.id} other]{_tones(camera.light, largest / headroom)}[{camera.id} most]",
         f"{maps['falloff']}mergeplanes=format=gbrp[{camera.id} falloff]",
         f"[{camera.id} least][{camera.id} most][{camera.id} falloff]maskedmerge,"
-        f"{_each(f'val*{headroom:.6f}+0.5')}[{camera.id} even]",
+        f"lutrgb=r={brighter}:g={brighter}:b={brighter}[{camera.id} even]",
     ]
 
 
@@ -171,11 +172,6 @@ def _tones(light: Light, times: float) -> str:
         f"{MIDDLE * gain * times:.6f}*pow(val/{MIDDLE:g},{1 + light.contrast:.6f})+0.5" for gain in light.gain
     )
     return f"lutrgb=r='{red}':g='{green}':b='{blue}'"
-
-
-def _each(expression: str) -> str:
-    """Return the filter that applies one expression to each colour."""
-    return f"lutrgb=r='{expression}':g='{expression}':b='{expression}'"
 
 
 def _fill(camera: _Camera) -> str:
