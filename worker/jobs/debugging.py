@@ -34,14 +34,14 @@ class DebugRecorder(Recorder):
 
     def __init__(self) -> None:
         self._files: dict[str, bytes] = {}
-        self._index: list[dict[str, str]] = []
+        self._index: dict[str, dict[str, str]] = {}
         self._frames: dict[str, Frame] = {}
         self._levels: list[dict[str, Any]] = []
 
     @property
     def files(self) -> dict[str, bytes]:
         """The files by name; those of the stages that were reached."""
-        return self._files | {"index.json": _json({"files": self._index})}
+        return self._files | {"index.json": _json({"files": [*self._index.values()]})}
 
     def observed(
         self,
@@ -81,8 +81,6 @@ class DebugRecorder(Recorder):
                 ],
             }
         )
-        self._files.pop("search.json", None)
-        self._index = [entry for entry in self._index if entry["file"] != "search.json"]
         self._add(
             "search.json",
             _json({"levels": self._levels}),
@@ -158,7 +156,7 @@ class DebugRecorder(Recorder):
     def _add(self, file: str, data: bytes, what: str, units: str, section: str) -> None:
         self._files[file] = data
         model = f"docs/model.md#{section}" if section[:1].isdigit() else "docs/paper.md" if not section else ""
-        self._index.append({"file": file, "what": what, "units": units, "see": model or "docs/refused.md"})
+        self._index[file] = {"file": file, "what": what, "units": units, "see": model or "docs/refused.md"}
 
 
 def _dots(picture: Frame, at: Array, value: Array, words: str, legend: str = ": red 0, yellow 0.5, green 1") -> Frame:

@@ -17,9 +17,8 @@ from worker.calibration.diagnostics.registration import (
     LOOSE_M,
     PIXEL_M,
     Registration,
-    directions_in_common,
+    common_ground,
     forms_of_both,
-    reference_point,
 )
 from worker.calibration.diagnostics.seam import paint_apart
 from worker.calibration.geometry.camera import Array, Camera
@@ -40,7 +39,8 @@ def register_lines(pitch: Field, first: MeasuredLines, second: MeasuredLines) ->
 
     None where both have measured too little of the same lines to hold the views in the directions that they should.
     """
-    centre = reference_point(pitch, first.camera, second.camera)
+    ground = common_ground(pitch, first.camera, second.camera)
+    centre = ground.centre
     if centre is None:
         return None
     lines = pitch.measured_points
@@ -58,10 +58,9 @@ def register_lines(pitch: Field, first: MeasuredLines, second: MeasuredLines) ->
         np.einsum("md,mdj->mj", points.normal[:, :2], forms), apart, sigma, lines.spacing, at_centre
     )
 
-    expected_directions = directions_in_common(pitch, first.camera, second.camera, centre)
     variance, directions = np.linalg.eigh(at_centre @ covariance @ at_centre.T)
-    directions_held = directions[:, variance < LOOSE_M**2][:, :expected_directions]
-    if directions_held.shape[1] < expected_directions:
+    directions_held = directions[:, variance < LOOSE_M**2][:, : ground.directions]
+    if directions_held.shape[1] < ground.directions:
         return None
     dx, dy = directions_held @ directions_held.T @ at_centre @ moves / PIXEL_M
     return Registration(float(dx), float(dy), support_m, (first.camera.id, second.camera.id), centre, directions_held)

@@ -73,18 +73,12 @@ class Registration:
 
 def pairs_in_common(pitch: Field, cameras: Sequence[Camera]) -> list[tuple[Camera, Camera]]:
     """Return the pairs of cameras that, by their poses, see enough of the same markings to be compared."""
-    return [
-        (first, second)
-        for first, second in combinations(cameras, 2)
-        if (centre := reference_point(pitch, first, second)) is not None
-        and directions_in_common(pitch, first, second, centre) > 0
-    ]
+    return [pair for pair in combinations(cameras, 2) if common_ground(pitch, *pair).directions > 0]
 
 
 def shares_plenty(pitch: Field, first: Camera, second: Camera) -> bool:
     """True if two cameras, by their poses, see so many of the same markings that their views have to register."""
-    centre = reference_point(pitch, first, second)
-    return centre is not None and directions_in_common(pitch, first, second, centre) == 2
+    return common_ground(pitch, first, second).directions == 2
 
 
 def register_pair(
@@ -95,16 +89,15 @@ def register_pair(
     Responses: float32 (height, width), probability 0..1 of a marking in each pixel of the raw frame. None if the
     cameras show no markings in common, or show them too far apart.
     """
-    centre = reference_point(pitch, first, second)
-    if centre is None:
+    ground = common_ground(pitch, first, second)
+    if ground.centre is None:
         return None
     segmented = ((first, first_response), (second, second_response))
-    expected_directions = directions_in_common(pitch, first, second, centre)
-    best = _best_fit(pitch, segmented, centre, expected_directions)
+    best = _best_fit(pitch, segmented, ground.centre, ground.directions)
     if best is None or best.support < LEAST_SUPPORT_M or best.correlation < 0.3:
         return None
     # A halfway line fits itself wherever it is slid to. Where a circle should have held it, that is no registration.
-    if best.held < expected_directions:
+    if best.held < ground.directions:
         return None
     dx, dy = best.displacement / PIXEL_M
     return Registration(float(dx), float(dy), best.support, (first.id, second.id), best.middle, best.directions)
@@ -134,30 +127,38 @@ def _put(pitch: Field, camera: Camera, pixel: Array) -> Array:
     return np.asarray(point)
 
 
-def reference_point(pitch: Field, first: Camera, second: Camera) -> Array | None:
-    """Return the field's centre (2,) if both see it, else the middle of the common markings nearest to it."""
-    points = np.concatenate([pitch.lift(np.zeros((1, 2))), pitch.line_points(0.5).position])
-    seen = np.all([camera.sees(camera.project(points)) for camera in (first, second)], axis=0)
-    if not seen.any():
-        return None
-    if seen[0]:
-        return np.zeros(2)
-    common: Array = points[seen, :2]
-    nearest = common[np.argmin(np.linalg.norm(common, axis=1))]
-    return np.asarray(common[np.linalg.norm(common - nearest, axis=1) < FINE_HALF_M].mean(axis=0))
+@dataclass(frozen=True)
+class CommonGround:
+    """Place (2,) where two cameras are compared, None if they see no common markings.
+
+    `directions`: in how many of them, 0 to 2, the common markings around it should hold a view.
+    """
+
+    centre: Array | None
+    directions: int
 
 
-def directions_in_common(pitch: Field, first: Camera, second: Camera, centre: Array) -> int:
-    """Return in how many directions, 0 to 2, the common markings around a point (2,) should hold a view.
+def common_ground(pitch: Field, first: Camera, second: Camera) -> CommonGround:
+    """Return the field's centre if both see it, else the middle of the common markings nearest to it.
 
-    There must be enough line across a direction, and it must not be so far aside that a turn and a move of a camera
-    which cancel there still shift the point: a court whose centre has no circle is held along its centre line by
-    nothing but a side line 10 m away.
+    For a direction to count there must be enough line across it, and it must not be so far aside that a turn and a
+    move of a camera which cancel there still shift the point: a court whose centre has no circle is held along its
+    centre line by nothing but a side line 10 m away.
     """
     lines = pitch.line_points(0.5)
-    seen = np.all([camera.sees(camera.project(lines.position)) for camera in (first, second)], axis=0)
-    near = np.abs(lines.position[:, :2] - centre).max(axis=1) < FINE_HALF_M
-    common = lines[seen & near]
+    middle = pitch.lift(np.zeros((1, 2)))
+    (sees_middle, *_), seen = (
+        np.all([camera.sees(camera.project(points)) for camera in (first, second)], axis=0)
+        for points in (middle, lines.position)
+    )
+    if not sees_middle and not seen.any():
+        return CommonGround(None, 0)
+    centre = np.zeros(2)
+    if not sees_middle:
+        places: Array = lines.position[seen, :2]
+        nearest = places[np.argmin(np.linalg.norm(places, axis=1))]
+        centre = places[np.linalg.norm(places - nearest, axis=1) < FINE_HALF_M].mean(axis=0)
+    common = lines[seen & (np.abs(lines.position[:, :2] - centre).max(axis=1) < FINE_HALF_M)]
     across = common.normal[:, :2]
     # Length of line across a direction that holds the views in it.
     enough = np.linalg.eigvalsh(lines.spacing * across.T @ across) > 8.0
@@ -167,7 +168,7 @@ def directions_in_common(pitch: Field, first: Camera, second: Camera, centre: Ar
     at_centre = forms_of_both(first, second, pitch.lift(centre))
     covariance = at_centre @ np.linalg.inv(information + np.eye(len(information))) @ at_centre.T
     held = np.linalg.eigvalsh(covariance) < LOOSE_M**2
-    return int(min(np.count_nonzero(enough), np.count_nonzero(held)))
+    return CommonGround(centre, int(min(np.count_nonzero(enough), np.count_nonzero(held))))
 
 
 @dataclass(frozen=True)
