@@ -58,14 +58,15 @@ class TrackedGeometryFactory:
         if self._moving is not None:
             self._moving.finish()
 
-    def _note(self, moment: TrackedMoment, references: Sequence[Camera], rate: Fraction) -> None:
-        for reference, now in zip(references, moment.cameras, strict=True):
-            motion = self.motions.setdefault(reference.id, MotionSummary())
-            motion.how[now.how] += 1
-            turned = float(rotation_angles_deg(reference.pose.rotation, now.camera.pose.rotation))
-            motion.farthest_deg = max(motion.farthest_deg, turned)
-        if self._keep is not None:
-            self._keep(moment, rate)
+    def _note(self, moments: Sequence[TrackedMoment], references: Sequence[Camera], rate: Fraction) -> None:
+        for moment in moments:
+            for reference, now in zip(references, moment.cameras, strict=True):
+                motion = self.motions.setdefault(reference.id, MotionSummary())
+                motion.how[now.how] += 1
+                turned = float(rotation_angles_deg(reference.pose.rotation, now.camera.pose.rotation))
+                motion.farthest_deg = max(motion.farthest_deg, turned)
+            if self._keep is not None:
+                self._keep(moment, rate)
 
 
 @dataclass
@@ -78,7 +79,7 @@ class _TrackedGeometry:
     lights: Mapping[str, Light]
     rate: Fraction
     every: int
-    report: Callable[[TrackedMoment, Sequence[Camera], Fraction], None]
+    report: Callable[[Sequence[TrackedMoment], Sequence[Camera], Fraction], None]
     _follower: CameraTracker | None = field(default=None, init=False)
     _panoramas: dict[frozenset[str], MovingPanorama] = field(default_factory=dict, init=False)
 
@@ -89,13 +90,13 @@ class _TrackedGeometry:
         else:
             measured = pictures if self._follower.looks else {}
             self._follower.see(measured)
-        self._report(self._follower, self._follower.settled())
+        self.report(self._follower.settled(), self._follower.references, self.rate)
         return self._panorama(self._follower, frozenset(pictures))
 
     def finish(self) -> None:
         """Report the moments that were not reported yet."""
         if self._follower is not None:
-            self._report(self._follower, self._follower.rest())
+            self.report(self._follower.rest(), self._follower.references, self.rate)
 
     def _start_tracking(self, pictures: Mapping[str, Picture]) -> CameraTracker:
         seen = [camera for camera in self.cameras if camera.id in pictures]
@@ -115,7 +116,3 @@ class _TrackedGeometry:
             still = [references[camera] for camera in ids]
             self._panoramas[shown] = MovingPanorama(self.pitch, self.view, still, self.lights)
         return self._panoramas[shown].at([now[camera] for camera in ids])
-
-    def _report(self, follower: CameraTracker, moments: Sequence[TrackedMoment]) -> None:
-        for moment in moments:
-            self.report(moment, follower.references, self.rate)

@@ -254,16 +254,16 @@ def _result(
     chosen: _Chosen,
 ) -> LensCalibration:
     best = chosen.best
-    lens, fit = best.fit.lens, best.fit
+    fit = best.fit
     off = [
-        residuals_px(lens, turn, shift, s.world, s.pixel)
+        residuals_px(fit.lens, turn, shift, s.world, s.pixel)
         for turn, shift, s in zip(fit.turns, fit.shifts, used.values(), strict=True)
     ]
     corners = np.concatenate([s.pixel for s in used.values()])
     sigma, spread = best.deviations
     coverage = measure_coverage(corners, size)
     return LensCalibration(
-        replace(lens, sigma=_known_to(chosen)),
+        replace(fit.lens, sigma=_known_to(chosen)),
         best.rung.terms,
         best.trial.rms_px,
         best.trial.left_out_px,
@@ -272,7 +272,7 @@ def _result(
         _verdicts(photos, size, used, hurting, best),
         coverage,
         [one.trial for one in chosen.tried],
-        _warnings(lens, chosen, sigma, spread, coverage, len(used)),
+        _warnings(chosen, coverage, len(used)),
         corners,
         np.concatenate(off),
     )
@@ -351,22 +351,16 @@ def measure_coverage(corners: Array, size: tuple[int, int]) -> Coverage:
     return Coverage(cells.astype(np.intp), sorted(empty, key=lambda name: " " not in name))
 
 
-def _warnings(
-    lens: Lens,
-    chosen: _Chosen,
-    sigma: Mapping[str, float],
-    spread: Mapping[str, float],
-    coverage: Coverage,
-    count: int,
-) -> list[str]:
+def _warnings(chosen: _Chosen, coverage: Coverage, count: int) -> list[str]:
     found = []
+    lens = chosen.best.fit.lens
     if coverage.empty or coverage.share < 0.6:
         where = f" and nothing {', '.join(coverage.empty)}" if coverage.empty else ""
         found.append(
             f"the board reached {coverage.share:.0%} of the picture{where}: there the lens is a guess, and with it the "
             "principal point. Add photos with the board in those places"
         )
-    worst = _worse(sigma, spread)
+    worst = _worse(*chosen.best.deviations)
     focal = max(worst.get(name, 0.0) for name in ("f", "fx", "fy"))
     centre = max(worst.get(name, 0.0) for name in ("cx", "cy"))
     # Largest sigma for a field, as a part of the focal length, or of the picture's width for the centre.
@@ -375,7 +369,7 @@ def _warnings(
         found.append(f"the focal length is sure to {focal:.0f} px only: tilt the board more, both ways")
     if centre > largest_sigma * lens.size[0]:
         found.append(f"the principal point is sure to {centre:.0f} px only: add photos all over the picture")
-    if "cx" not in sigma:
+    if "cx" not in worst:
         found.append("the photos do not fix the principal point: it was left in the middle of the picture")
     best, richest = chosen.best.trial, chosen.tried[-1].trial
     more = [term for term in richest.terms if term.startswith(("k", "p")) and term not in best.terms]

@@ -64,13 +64,11 @@ def picture(request: StitchRequest, made: Panorama, files: Mapping[str, bytes]) 
 def _read(part: Contribution, file: bytes) -> tuple[Contribution, Picture]:
     """A camera's frame, and what it gives to the view as it was read: of half the size where that is enough."""
     width, height = part.frame_size
-    if width % 2 or height % 2 or scaled_size(part)[0] > width // 2:
-        return part, decode_frame(part.camera, [width, height], file)
-    half = decode_by_opencv(file, cv2.IMREAD_REDUCED_COLOR_2)
-    if half is None or half.shape[:2] != (height // 2, width // 2):
-        return part, decode_frame(part.camera, [width, height], file)
-    size = width // 2, height // 2
-    return replace(part, frame_size=size, source=in_scaled(part, size)), half
+    if width % 2 == height % 2 == 0 and scaled_size(part)[0] <= width // 2:
+        half, size = decode_by_opencv(file, cv2.IMREAD_REDUCED_COLOR_2), (width // 2, height // 2)
+        if half is not None and half.shape[1::-1] == size:
+            return replace(part, frame_size=size, source=in_scaled(part, size)), half
+    return part, decode_frame(part.camera, [width, height], file)
 
 
 if __name__ == "__main__":
