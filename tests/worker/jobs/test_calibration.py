@@ -457,7 +457,7 @@ def test_a_picture_that_cannot_be_drawn_costs_no_result(venue, files, asked, mea
     def stitched(*_):
         raise ValueError
 
-    monkeypatch.setattr(pictures.stitched_pictures, "stitched", stitched)
+    monkeypatch.setattr(pictures, "stitched", stitched)
     outcome = solve(venue, files, Options(seed=1, pictures=True), means, lambda _: None)
     assert {"birdseye", "overlay_left", "overlay_right"} <= set(outcome.pictures)
     assert not {"preview", "preview_before"} & set(outcome.pictures)
