@@ -4,27 +4,18 @@
 one real job costs (the demo venue, two rendered 4K cameras); what a job costs the database `make bench-rate` says.
 """
 
-import json
-import os
 import statistics
-import subprocess
 import sys
-import tempfile
-import time
 from collections.abc import Callable
-from contextlib import closing
 from dataclasses import dataclass
-from pathlib import Path
 
-import httpx
 import obstore
 from obstore.store import from_url
 
-from benchmarks.processes import core_s
+from benchmarks.cost.__main__ import HERE, measure_job, running
+from benchmarks.cost.cases import DEMO_CAMERAS, case
 from service.settings import Settings
-from testbed.running import children, ready, wait_for
 
-DEMO = Path(__file__).parents[1] / "demo"
 FLEETS = (100, 10_000)
 JOBS_MEASURED = 3
 
@@ -93,6 +84,10 @@ class Fleet:
         return job.core_s + job.worker_core_s + job.api_core_s + job.postgres_core_s
 
     @property
+    def worker_cores(self) -> float:
+        return self.jobs_per_s * (self.job.core_s + self.job.worker_core_s) / self.chosen.used
+
+    @property
     def venues_on_a_small_machine(self) -> float:
         return self.chosen.used * self.chosen.small_cores * self.chosen.every_s / self.all_core_s
 
@@ -102,78 +97,42 @@ class Fleet:
         return self.chosen.small_w * self.chosen.every_s / self.venues_on_a_small_machine
 
     @property
-    def worker_cores(self) -> float:
-        return self.jobs_per_s * (self.job.core_s + self.job.worker_core_s) / self.chosen.used
-
-    @property
-    def jobs_running(self) -> float:
-        return self.jobs_per_s * self.job.elapsed_s
-
-    @property
-    def rows_kept(self) -> float:
-        return self.jobs_per_day * self.chosen.keep_jobs_days
-
-    @property
-    def database_gb(self) -> float:
-        return self.rows_kept * self.job.database_kb / 1e6
-
-    @property
-    def database_gb_fewer_days(self) -> float:
-        return self.jobs_per_day * self.chosen.keep_jobs_fewer_days * self.job.database_kb / 1e6
-
-    @property
     def files_kept_days(self) -> float:
         """Frames stay as long as pictures that nobody has looked at could be drawn of them."""
         return max(self.chosen.keep_frames_days, self.chosen.keep_pictures_days)
 
-    @property
-    def bucket_gb(self) -> float:
-        return self.jobs_per_day * self.files_kept_days * (self.job.frame_mb + self.job.picture_mb) / 1e3
-
-    @property
-    def objects(self) -> float:
-        return self.jobs_per_day * self.files_kept_days * (self.job.frames + self.job.pictures)
-
-    @property
-    def puts_per_month(self) -> float:
-        # Frames are copied once more, to stay beside the pictures.
-        return 30 * self.jobs_per_day * (2 * self.job.frames + self.job.pictures)
-
-    @property
-    def gets_and_lists_per_month(self) -> float:
-        # A worker gets each frame, and looks for four pictures, one of each that are drawn together, before those go;
-        # frames and pictures are listed once more to be deleted, which costs nothing itself.
-        return 30 * self.jobs_per_day * (self.job.frames + 4 + 2)
-
-    @property
-    def mbit_per_s_in(self) -> float:
-        return 8 * self.jobs_per_s * self.job.frame_mb
-
-    @property
-    def mbit_per_s_bucket(self) -> float:
-        # In by the API, out to the worker, and the pictures in.
-        return 8 * self.jobs_per_s * (2 * self.job.frame_mb + self.job.picture_mb)
+    def database_gb(self, kept_days: float) -> float:
+        """Size of the database if jobs are kept for so long."""
+        return self.jobs_per_day * kept_days * self.job.database_kb / 1e6
 
 
 MEASURED = Measured()
-ROWS: dict[str, Callable[[Fleet], str]] = {
-    "jobs": lambda f: f"{_n(f.jobs_per_s)} a second, {_n(f.jobs_per_day)} a day",
-    "**Workers**: cores": lambda f: f"{_n(f.worker_cores)} at {f.chosen.used:.0%} use",
-    "machines of 16 cores": lambda f: _machines(f.worker_cores / f.chosen.cores_per_machine),
-    "jobs running at once": lambda f: _n(f.jobs_running),
-    "**API**: cores, but for the bytes of frames": lambda f: _n(f.jobs_per_s * f.job.api_core_s),
-    "**Database**: cores": lambda f: _n(f.jobs_per_s * f.job.postgres_core_s),
-    "transactions": lambda f: f"{_n(f.jobs_per_s * f.job.transactions)} a second",
-    "write-ahead log": lambda f: f"{_n(f.jobs_per_s * f.job.wal_kb / 1e3)} MB a second",
-    "rows of jobs, kept 400 days": lambda f: _n(f.rows_kept),
-    "size, kept 400 days": lambda f: f"{_n(f.database_gb)} GB",
-    "size, kept 30 days": lambda f: f"{_n(f.database_gb_fewer_days)} GB",
-    "**Bucket**: size": lambda f: f"{_n(f.bucket_gb)} GB",
-    "objects": lambda f: _n(f.objects),
-    "PUT": lambda f: f"{_n(f.puts_per_month)} a month",
-    "GET and LIST": lambda f: f"{_n(f.gets_and_lists_per_month)} a month",
-    "**Network**: from the venues": lambda f: f"{_n(f.mbit_per_s_in)} Mbit/s",
-    "to and from the bucket": lambda f: f"{_n(f.mbit_per_s_bucket)} Mbit/s",
+ROWS: dict[str, Callable[[Fleet, Measured, Chosen], str]] = {
+    "jobs": lambda f, job, chosen: f"{_n(f.jobs_per_s)} a second, {_n(f.jobs_per_day)} a day",
+    "**Workers**: cores": lambda f, job, chosen: f"{_n(f.worker_cores)} at {chosen.used:.0%} use",
+    "machines of 16 cores": lambda f, job, chosen: _machines(f.worker_cores / chosen.cores_per_machine),
+    "jobs running at once": lambda f, job, chosen: _n(f.jobs_per_s * job.elapsed_s),
+    "**API**: cores, but for the bytes of frames": lambda f, job, chosen: _n(f.jobs_per_s * job.api_core_s),
+    "**Database**: cores": lambda f, job, chosen: _n(f.jobs_per_s * job.postgres_core_s),
+    "transactions": lambda f, job, chosen: f"{_n(f.jobs_per_s * job.transactions)} a second",
+    "write-ahead log": lambda f, job, chosen: f"{_n(f.jobs_per_s * job.wal_kb / 1e3)} MB a second",
+    "rows of jobs, kept 400 days": lambda f, job, chosen: _n(f.jobs_per_day * chosen.keep_jobs_days),
+    "size, kept 400 days": lambda f, job, chosen: f"{_n(f.database_gb(chosen.keep_jobs_days))} GB",
+    "size, kept 30 days": lambda f, job, chosen: f"{_n(f.database_gb(chosen.keep_jobs_fewer_days))} GB",
+    "**Bucket**: size": lambda f, job, chosen: (
+        f"{_n(f.jobs_per_day * f.files_kept_days * (job.frame_mb + job.picture_mb) / 1e3)} GB"
+    ),
+    "objects": lambda f, job, chosen: _n(f.jobs_per_day * f.files_kept_days * (job.frames + job.pictures)),
+    # Frames are copied once more, to stay beside the pictures.
+    "PUT": lambda f, job, chosen: f"{_n(30 * f.jobs_per_day * (2 * job.frames + job.pictures))} a month",
+    # A worker gets each frame, and looks for four pictures, one of each that are drawn together, before those go;
+    # frames and pictures are listed once more to be deleted, which costs nothing itself.
+    "GET and LIST": lambda f, job, chosen: f"{_n(30 * f.jobs_per_day * (job.frames + 4 + 2))} a month",
+    "**Network**: from the venues": lambda f, job, chosen: f"{_n(8 * f.jobs_per_s * job.frame_mb)} Mbit/s",
+    # In by the API, out to the worker, and the pictures in.
+    "to and from the bucket": lambda f, job, chosen: (
+        f"{_n(8 * f.jobs_per_s * (2 * job.frame_mb + job.picture_mb))} Mbit/s"
+    ),
 }
 
 
@@ -203,7 +162,10 @@ def tables() -> str:
         *(f"| {what} | {much} |" for what, much in costs.items()),
     ]
     lines += ["", f"| venues | {' | '.join(_n(fleet.venues) for fleet in fleets)} |", "|---|" + "---|" * len(fleets)]
-    lines += [f"| {title} | {' | '.join(cell(fleet) for fleet in fleets)} |" for title, cell in ROWS.items()]
+    lines += [
+        f"| {title} | {' | '.join(cell(fleet, job, fleet.chosen) for fleet in fleets)} |"
+        for title, cell in ROWS.items()
+    ]
     lines += ["", energy(fleets[0])]
     return "\n".join(lines)
 
@@ -221,46 +183,18 @@ def energy(fleet: Fleet) -> str:
 
 def measure() -> None:
     """Measure a real job, with nothing else on the machine."""
-    with tempfile.TemporaryDirectory(prefix="esc-sizing-") as folder:
-        data = Path(folder)
-        environment = os.environ | {"ESC_DATA": folder, "ESC_LOG_LEVEL": "warning"}
-        command = [sys.executable, "-m", "service.cli", "up", "--port", "0"]
-        with subprocess.Popen(command, env=environment, stdout=subprocess.PIPE) as service:
-            address = service.stdout.readline().decode().split()[-1]
-            with closing(httpx.Client(base_url=address, timeout=120)) as http:
-                wait_for(lambda: ready(http))
-                http.put("/venues/demo", json=json.loads((DEMO / "venue.json").read_text())).raise_for_status()
-                (worker,) = children(service.pid)
-                jobs = [_real_job(http, worker) for _ in range(JOBS_MEASURED)]
-            sizes = {
-                kind: sum(
-                    entry["size"] for page in obstore.list(from_url((data / "blobs").as_uri()), kind) for entry in page
-                )
-                for kind in ("frames", "pictures")
-            }
-            service.terminate()
-    print(f"core_s={statistics.median(core for core, _ in jobs):.1f}")
-    print(f"elapsed_s={statistics.median(elapsed for _, elapsed in jobs):.1f}")
-    print(f"frame_mb={sizes['frames'] / JOBS_MEASURED / 1e6:.2f}")
-    print(f"picture_mb={sizes['pictures'] / JOBS_MEASURED / 1e6:.2f}")
-
-
-def _real_job(http: httpx.Client, worker: int) -> tuple[float, float]:
-    """Core seconds of its process, and how long it took."""
-    before, begun = _of_children(worker), time.monotonic()
-    files = [(camera, (DEMO / f"{camera}.jpg").read_bytes()) for camera in ("left", "right")]
-    job = http.post("/venues/demo/calibrate", files=files).raise_for_status().json()
-    ended = wait_for(lambda: (now := http.get(f"/jobs/{job['id']}?wait=60").json())["finished_at"] and now, 300)
-    assert ended["result"]["accepted"], ended
-    elapsed = time.monotonic() - begun
-    # The worker has waited for the process soon after the end is written down.
-    spent = wait_for(lambda: (now := _of_children(worker)) > before and now - before)
-    return spent, elapsed
-
-
-def _of_children(process: int) -> float:
-    """Seconds of processor time of the children that a process has waited for; proc(5)."""
-    return core_s(process, children=True) - core_s(process)
+    demo = case(DEMO_CAMERAS, "start")
+    with running("sizing", HERE) as release:
+        jobs = [measure_job(release, demo) for _ in range(JOBS_MEASURED)]
+        blobs = obstore.list(from_url((release.data / "blobs").as_uri()))
+        sizes_mb = {one["path"]: one["size"] / 1e6 for page in blobs for one in page}
+    frames_mb = sum(mb for path, mb in sizes_mb.items() if path.startswith("frames/"))
+    # The preview is drawn because the measurement looks at it.
+    masks_mb = sum(mb for path, mb in sizes_mb.items() if "/mask_" in path)
+    print(f"core_s={statistics.median(job['core_s'] for job in jobs):.1f}")
+    print(f"elapsed_s={statistics.median(job['answered_s'] for job in jobs):.1f}")
+    print(f"frame_mb={frames_mb / JOBS_MEASURED:.2f}")
+    print(f"picture_mb={masks_mb / JOBS_MEASURED:.2f}")
 
 
 def _n(value: float) -> str:

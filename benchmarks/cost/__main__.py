@@ -45,7 +45,7 @@ class Release:
 
     name: str
     commit: str
-    folder: Path
+    data: Path
     process: int
     http: httpx.Client
 
@@ -76,10 +76,10 @@ def main() -> None:
 def row(release: Release, cameras: str, start: str, number: int) -> dict:
     """One job of a release, from the file or run now."""
     key = {"release": release.name, "commit": release.commit, "cameras": cameras, "start": start, "run": number}
-    return ROWS.remembered(key, lambda: measure(release, case(cameras, start)))
+    return ROWS.remembered(key, lambda: measure_job(release, case(cameras, start)))
 
 
-def measure(release: Release, asked: Case) -> dict:
+def measure_job(release: Release, asked: Case) -> dict:
     """Measure a job from POST to its result, and then the time to fetch its pictures."""
     release.http.put(f"/venues/{asked.name}", json=asked.venue).raise_for_status()
     begun = time.monotonic()
@@ -120,7 +120,7 @@ def running(name: str, folder: Path) -> Iterator[Release]:
             try:
                 with httpx.Client(base_url=service.stdout.readline().split()[-1], timeout=120) as http:
                     wait_for(lambda: ready(http))
-                    yield Release(name, commit, folder, service.pid, http)
+                    yield Release(name, commit, Path(data), service.pid, http)
             finally:
                 service.terminate()
 
