@@ -15,7 +15,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -91,18 +91,26 @@ def _film(path: Path, frame: np.ndarray, count: int) -> None:
     height, width = frame.shape[:2]
     rng = np.random.default_rng(0)
     noise = rng.normal(0, NOISE, (height + 64, width + 64, 1)).astype(np.float32).repeat(3, axis=2)
-    with av.open(str(path), "w") as out:
-        stream = out.add_stream("libx264", rate=Fraction(RATE), options={"preset": "veryfast", "crf": "23"})
-        stream.width, stream.height, stream.pix_fmt = width, height, "yuv420p"
-        stream.codec_context.colorspace = stream.codec_context.color_range = 1
+
+    def shaken() -> Iterator[np.ndarray]:
         for number in range(count):
             down, right = rng.integers(0, 64, 2)
-            noisy = cv2.add(
-                np.roll(frame, number % 8, axis=1), noise[down : down + height, right : right + width], dtype=cv2.CV_8U
-            )
-            shot = av.VideoFrame.from_ndarray(noisy, format="bgr24")
+            part = noise[down : down + height, right : right + width]
+            yield cv2.add(np.roll(frame, number % 8, axis=1), part, dtype=cv2.CV_8U)
+
+    write_clip(path, (width, height), shaken(), RATE)
+
+
+def write_clip(path: Path, size: tuple[int, int], pictures: Iterable[np.ndarray], rate: int) -> None:
+    """Encode pictures of one size as a camera does: H.264 in the colours of HD television."""
+    with av.open(str(path), "w") as out:
+        stream = out.add_stream("libx264", rate=Fraction(rate), options={"preset": "veryfast", "crf": "23"})
+        stream.width, stream.height = size
+        stream.codec_context.colorspace = stream.codec_context.color_range = 1
+        for number, picture in enumerate(pictures):
+            shot = av.VideoFrame.from_ndarray(picture, format="bgr24")
             shot = shot.reformat(format="yuv420p", dst_colorspace=1, src_color_range=2, dst_color_range=1)
-            shot.pts, shot.time_base = number, Fraction(1, RATE)
+            shot.pts, shot.time_base = number, Fraction(1, rate)
             out.mux(stream.encode(shot))
         out.mux(stream.encode(None))
 
