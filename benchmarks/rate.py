@@ -11,7 +11,6 @@ Those of the script that stands in for the engine are told apart.
 
 import argparse
 import json
-import os
 import statistics
 import subprocess
 import sys
@@ -33,12 +32,13 @@ from benchmarks.processes import core_s
 from service.schemas.geometry import Moved, Pose
 from service.schemas.job import Progress
 from service.schemas.options import Options
-from service.schemas.results import CameraResult, Provenance, Result
 from service.schemas.venue import VenueIn
+from service.settings import Settings
 from service.store import tables
 from service.store.database import connect, migrate, writing
 from testbed.homes import postgres_binaries, postgres_server
-from testbed.running import upload, venue, wait_for
+from testbed.running import Service, upload, venue, wait_for
+from testbed.stock import result as accepted_result
 from worker.protocol import Message
 
 CAMERAS = ("left", "right")
@@ -87,16 +87,19 @@ def main() -> int:
         server = stack.enter_context(postgres_server(binaries, ("max_connections=300",)))
         with psycopg.connect(server.url("postgres"), autocommit=True) as connection:
             connection.execute("CREATE DATABASE esc")
-        environment = settings(folder, server.url("esc"), chosen)
         register_venues(server.url("esc"), chosen.venues)
-        api = stack.enter_context(process(environment, "serve", "--port", "0"))
-        address = api.stdout.readline().decode().split()[-1]
-        names = [f"worker-{number}" for number in range(chosen.workers)]
-        workers = [stack.enter_context(process(environment, "worker", "--name", name)) for name in names]
-        wait_for(lambda: figures(address)["esc_workers"] == chosen.workers, 60)
-        parts = Parts(server.url("esc"), api, workers)
+        api = Service(folder, "serve", cold=True, **settings(folder, server.url("esc"), chosen))
+        stack.callback(api.stop)
+        command = [sys.executable, "-m", "service.cli", "worker", "--name"]
+        workers = []
+        for number in range(chosen.workers):
+            worker = stack.enter_context(subprocess.Popen([*command, f"worker-{number}"], env=api.environment))
+            stack.callback(worker.terminate)
+            workers.append(worker)
+        wait_for(lambda: figures(api.url)["esc_workers"] == chosen.workers, 60)
+        parts = Parts(server.url("esc"), api.process, workers)
         measure_idle(chosen, parts)
-        return measure(chosen, address, parts)
+        return measure(chosen, api.url, parts)
 
 
 def arguments() -> argparse.Namespace:
@@ -112,65 +115,43 @@ def arguments() -> argparse.Namespace:
 
 
 def settings(folder: Path, database_url: str, chosen: argparse.Namespace) -> dict[str, str]:
-    model, stub = folder / "model.onnx", folder / "stub.sh"
-    model.write_bytes(b"a network")
-    progress = line_of(Message(progress=Progress(stage="segmentation", fraction=0.1)))
+    stub = folder / "stub.sh"
+    progress = Message(progress=Progress(stage="segmentation", fraction=0.1)).model_dump_json()
     reports = " ".join(map(str, range(REPORTS)))
     pause = chosen.seconds / REPORTS
-    stub.write_text(STUB.format(progress=progress, reports=reports, pause=pause, result=line_of(result())))
-    return os.environ | {
-        "ESC_DATA": str(folder),
+    stub.write_text(STUB.format(progress=progress, reports=reports, pause=pause, result=result().model_dump_json()))
+    return {
         "ESC_DATABASE_URL": database_url,
         "ESC_BLOB_URL": (folder / "blobs").as_uri(),
-        "ESC_MODEL": str(model),
         "ESC_JOB_PROGRAM": json.dumps(["/bin/sh", str(stub)]),
         "ESC_JOBS_AT_ONCE": str(chosen.jobs_at_once),
         "ESC_QUEUE_LIMIT": str(chosen.venues),
         "ESC_LOG_LEVEL": "warning",
+        "ESC_TAKEOVER_AFTER_S": str(Settings.model_fields["takeover_after_s"].default),
     }
-
-
-def line_of(message: Message) -> str:
-    """Return a message as the program of a job writes it."""
-    return message.model_dump_json(exclude_unset=True)
 
 
 def result() -> Message:
     """Accepted, two cameras, every number there: a result as large as they are."""
+    stored = VenueIn.model_validate(venue("v", cameras=CAMERAS)).to_venue()
+    plain = accepted_result(stored, accepted=True)
     pose = Pose.from_position(
         [1.6123456789, 0.1123456789, -0.2123456789], [-1.0123456789, -50.0123456789, 8.0123456789]
     )
     moved = Moved(rotation_deg=0.8123456789, position_m=0.1123456789, pixels=22.0123456789)
-    cameras = [
-        CameraResult(
-            id=camera,
-            accepted=True,
-            rejected_because=None,
-            pose=pose,
-            sigma=None,
-            moved=moved,
-            iou=0.9712345678,
-            residual_px=1.2123456789,
-        )
-        for camera in CAMERAS
-    ]
+    long_numbers = {"pose": pose, "moved": moved, "iou": 0.9712345678, "residual_px": 1.2123456789}
+    cameras = [camera.model_copy(update=long_numbers) for camera in plain.cameras]
     stages = ("decode", "segmentation", "evolution", "refinement", "quality", "preview")
-    provenance = Provenance(
-        software="0.1.0", model_sha256="f" * 64, seed=7, options=Options(seed=7).model_dump(exclude={"callback_url"})
-    )
-    found = Result(
-        verdict="accepted",
-        accepted=True,
-        rejected_because=None,
-        cameras=cameras,
-        stitch_error_px=0.2123456789,
-        stitch_error_before_px=14.123456789,
-        loss=0.2123456789,
-        generations=100,
-        timings_s=dict.fromkeys(stages, 1.234),
-        provenance=provenance,
-    )
-    return Message(result=found)
+    asked = {"model_sha256": "f" * 64, "options": Options(seed=7).model_dump(exclude={"callback_url"})}
+    whole = {
+        "cameras": cameras,
+        "stitch_error_px": 0.2123456789,
+        "stitch_error_before_px": 14.123456789,
+        "loss": 0.2123456789,
+        "timings_s": dict.fromkeys(stages, 1.234),
+        "provenance": plain.provenance.model_copy(update=asked),
+    }
+    return Message(result=plain.model_copy(update=whole))
 
 
 def register_venues(database_url: str, count: int) -> None:
@@ -189,24 +170,6 @@ def register_venues(database_url: str, count: int) -> None:
 
 def name(number: int) -> str:
     return f"venue-{number}"
-
-
-def process(environment: dict[str, str], *arguments: str) -> subprocess.Popen:
-    """Ended with the `with` block."""
-    command = [sys.executable, "-m", "service.cli", *arguments]
-    return _Ended(subprocess.Popen(command, env=environment, stdout=subprocess.PIPE))
-
-
-class _Ended(ExitStack):
-    def __init__(self, process: subprocess.Popen) -> None:
-        super().__init__()
-        self._process = process
-
-    def __enter__(self) -> subprocess.Popen:
-        super().__enter__()
-        self.enter_context(self._process)
-        self.callback(self._process.terminate)
-        return self._process
 
 
 def figures(address: str) -> dict[str, float]:
