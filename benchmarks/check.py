@@ -18,7 +18,7 @@ import json
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cache
+from itertools import islice
 from pathlib import Path
 
 import cv2
@@ -27,7 +27,7 @@ import numpy as np
 from benchmarks.fields import real
 from benchmarks.fields.cases import cases
 from benchmarks.fields.judging import share
-from benchmarks.fields.rendered import LEAST_SHOWN, Shot, shot
+from benchmarks.fields.rendered import clear_shots
 from benchmarks.printing import print_sections, table_head
 from benchmarks.rows import Rows
 from benchmarks.scenes import FOLDER as RUNS
@@ -78,7 +78,7 @@ def main() -> None:
 
 
 def _rendered(options: argparse.Namespace, rows: Rows) -> Iterator[str]:
-    views = [_rendered_view(name, number) for name in options.fields for number in range(options.views)]
+    views = [view for name in options.fields for view in _rendered_views(name, options.views)]
     yield from _table(views, options, rows)
 
 
@@ -187,22 +187,12 @@ def _checked(view: View, way: str) -> dict:
     }
 
 
-def _rendered_view(name: str, number: int) -> View:
-    taken = _clear_shots(name, number + 1)[number]
-    _, png = cv2.imencode(".png", taken.frame)
-    return View(f"{name} {number}", FieldOfPlay.model_validate({"template": name}), _input(taken.camera), png.tobytes())
-
-
-@cache
-def _clear_shots(name: str, count: int) -> list[Shot]:
-    """Return the first views of a template that show most of their lines."""
-    clear: list[Shot] = []
-    at = 0
-    while len(clear) < count:
-        taken = shot(name, at)
-        clear += [taken] if taken.shown >= LEAST_SHOWN else []
-        at += 1
-    return clear
+def _rendered_views(name: str, count: int) -> Iterator[View]:
+    """Yield the first views of a template that show most of their lines."""
+    field = FieldOfPlay.model_validate({"template": name})
+    for number, (_, taken) in enumerate(islice(clear_shots(name), count)):
+        _, png = cv2.imencode(".png", taken.frame)
+        yield View(f"{name} {number}", field, _input(taken.camera), png.tobytes())
 
 
 def _input(camera: Camera) -> CheckedCamera:

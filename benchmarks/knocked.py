@@ -21,7 +21,6 @@ import argparse
 import zlib
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
-from itertools import count
 from pathlib import Path
 
 import cv2
@@ -31,7 +30,7 @@ from benchmarks.fields import real
 from benchmarks.fields.cases import Case, cases, started
 from benchmarks.fields.engine import Engine
 from benchmarks.fields.judging import near, share
-from benchmarks.fields.rendered import LEAST_SHOWN, shot
+from benchmarks.fields.rendered import clear_shots
 from benchmarks.find import NEAR, UNSEEN_PX, ends_alike, wrong_in_words, wrong_ones
 from benchmarks.printing import print_sections, table_head
 from benchmarks.rows import Rows
@@ -179,7 +178,7 @@ def _of_scene(name: str) -> tuple[Field, list[Camera], dict[str, list[Frame]]]:
 
 
 def _rendered_row(name: str, number: int, engine: Engine) -> dict:
-    taken = next(one for n in count(1000 * (number + 1)) if (one := shot(name, n)).shown >= LEAST_SHOWN)
+    _, taken = next(clear_shots(name, 1000 * (number + 1)))
     stored = _before_a_knock(taken.pitch, taken.camera, _rng(name, number))
     off_px = partial(mean_shift_px, taken.pitch, FieldMap.of(taken.pitch), taken.camera, unseen_px=UNSEEN_PX)
 

@@ -234,7 +234,7 @@ def learned(name: str) -> Method:
     """Find a homography by a net of `benchmarks.learned`; PyTorch is loaded before its time is taken."""
 
     def run(seen: Seen, cameras: list[Camera], seed: int) -> Answer:
-        from benchmarks.learned.answers import displacement_by
+        from benchmarks.learned.nets import displacement_by
 
         return by_homography(displacement_by(name))(seen, cameras, seed)
 

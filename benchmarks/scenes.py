@@ -150,9 +150,3 @@ def rendered(name: str, pitch: Field, camera: Camera, conditions: Conditions) ->
         cv2.imwrite(str(path), frame, [cv2.IMWRITE_PNG_COMPRESSION, 1])
         note.write_text(recipe)
     return np.asarray(cv2.imread(str(path), cv2.IMREAD_COLOR), dtype=np.uint8)
-
-
-if __name__ == "__main__":
-    for each in VENUES:
-        scene(each)
-        print(each, flush=True)

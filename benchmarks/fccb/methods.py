@@ -156,7 +156,7 @@ def _ecc() -> Displacement:
 
 def _learned(name: str) -> Displacement:
     # PyTorch is in the extra `bench` alone.
-    from benchmarks.learned.answers import displacement_by
+    from benchmarks.learned.nets import displacement_by
 
     return displacement_by(name)
 

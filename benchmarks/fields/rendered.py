@@ -6,6 +6,7 @@ import argparse
 import zlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import count
 from pathlib import Path
 
 import cv2
@@ -150,6 +151,12 @@ def shot(name: str, number: int) -> Shot:
     rng = np.random.default_rng([zlib.crc32(name.encode()), number])
     pitch = usual_field(name)
     return take_shot(name, pitch, random_camera(rng, pitch), rng, is_usual_floor=number % 2 == 0)
+
+
+def clear_shots(name: str, first: int = 0) -> Iterator[tuple[int, Shot]]:
+    """Yield the views of a template, from number `first` on, that show most of their lines, with their numbers."""
+    shots = ((number, shot(name, number)) for number in count(first))
+    return ((number, taken) for number, taken in shots if taken.shown >= LEAST_SHOWN)
 
 
 def take_shot(name: str, pitch: Field, camera: Camera, rng: np.random.Generator, *, is_usual_floor: bool) -> Shot:

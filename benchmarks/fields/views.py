@@ -7,7 +7,7 @@ import zlib
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import count
+from itertools import islice
 
 import cv2
 import numpy as np
@@ -15,7 +15,7 @@ import numpy as np
 from benchmarks.fields.cases import Case, cases, started
 from benchmarks.fields.engine import Engine, camera_row
 from benchmarks.fields.judging import reasons, share
-from benchmarks.fields.rendered import LEAST_SHOWN, shot
+from benchmarks.fields.rendered import clear_shots
 from benchmarks.printing import table_head
 from benchmarks.truth import apart
 from worker.calibration.detection.view_condition import UsualView, look_at
@@ -62,13 +62,10 @@ def _real(case: Case) -> View:
 
 def _rendered(name: str, wanted: int) -> Iterator[View]:
     """The first views of a template, beyond those of section `rendered`, that show their lines."""
-    clear = (
+    return (
         View(f"{name}-{number}", taken.pitch, taken.camera, lambda taken=taken: taken.frame)
-        for number in count(1000)
-        for taken in [shot(name, number)]
-        if taken.shown >= LEAST_SHOWN
+        for number, taken in islice(clear_shots(name, 1000), wanted)
     )
-    return (view for view, _ in zip(clear, range(wanted), strict=False))
 
 
 def _table(kind: str, views: Sequence[View], options: argparse.Namespace, engine: Engine) -> Iterator[str]:

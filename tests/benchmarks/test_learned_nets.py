@@ -9,8 +9,7 @@ import pytest
 torch = pytest.importorskip("torch", reason="needs the extra `bench`: pip install '.[bench]'")
 
 from benchmarks.learned import weights  # noqa: E402
-from benchmarks.learned.answers import displacement_by  # noqa: E402
-from benchmarks.learned.nets import NETS  # noqa: E402
+from benchmarks.learned.nets import NETS, displacement_by  # noqa: E402
 from benchmarks.learned.otle import candidate_errors  # noqa: E402
 from benchmarks.learned.pairs import Pairs  # noqa: E402
 from benchmarks.learned.pool import Drawn, Pool, batch_of  # noqa: E402
