@@ -4,8 +4,9 @@ Each process counts the requests that it answers. Everything else is read from t
 every API process shows the same, and restarts of workers lose nothing.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any, TypeVar, get_args
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from datetime import datetime
+from typing import get_args
 
 import structlog
 from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, ProcessCollector
@@ -20,7 +21,6 @@ from service.store.alarms import BEGUN
 from service.store.database import DATABASE_OUTAGES
 from service.store.events.outbox import CALLBACKS
 from service.store.jobs.submission import PRIORITIES
-from service.store.live import LiveGauges
 from service.store.statistics.counters import DURATION, STAGE, STITCH_ERROR, WAIT, CounterKey, HistogramBuckets
 from service.store.statistics.job_outcome import (
     ENDED,
@@ -32,63 +32,97 @@ from service.store.statistics.job_outcome import (
     VIEW_CONDITIONS,
     VIEWS,
 )
-from service.store.statistics.snapshot import StatisticsSnapshot, VenueGauges
+from service.store.statistics.snapshot import QueuedJobs, StatisticsSnapshot
 from service.store.statistics.source_timings import FETCH, FRAME, NONE
 from service.store.unreadable import RowKind, unreadable_rows
-from service.store.venue_state import AnchorRow
 from service.store.workers import WorkerHeartbeat
 
-# Name, help and value of gauges; an unknown value (None) makes no sample.
-OF_VENUES: tuple[tuple[str, str, Callable[[VenueGauges], float | None]], ...] = (
+# Gauges of venues, cameras and live poses: name, help, and which figure it shows.
+OF_VENUES = (
     (
         "esc_venue_stitch_error_pixels",
         "Stitch error of the current poses, by the last result; 1 px is 10 cm.",
-        lambda venue: venue.stitch_error_px,
+        "stitch_error_px",
     ),
-    ("esc_venue_moved_pixels", "Largest movement of a camera in the last result.", lambda venue: venue.moved_px),
-    ("esc_venue_drift_pixels", "Largest movement of a camera since its pose was set.", lambda venue: venue.drift_px),
-    (
-        "esc_venue_accepted_timestamp_seconds",
-        "Time at which poses were last accepted.",
-        lambda venue: None if venue.accepted_at is None else venue.accepted_at.timestamp(),
-    ),
+    ("esc_venue_moved_pixels", "Largest movement of a camera in the last result.", "moved_px"),
+    ("esc_venue_drift_pixels", "Largest movement of a camera since its pose was set.", "drift_px"),
+    ("esc_venue_accepted_timestamp_seconds", "Time at which poses were last accepted.", "accepted_at"),
 )
-OF_CAMERAS: tuple[tuple[str, str, Callable[[AnchorRow], float | None]], ...] = (
+OF_CAMERAS = (
     (
         "esc_camera_trend_meters",
         "Distance of the camera's moving average from its baseline, at the far touchline.",
-        lambda camera: camera.moved_m,
+        "moved_m",
     ),
     (
         "esc_camera_trend_cusum",
         "Largest cumulative sum of the camera's control charts, in standard deviations; above 5 it has moved.",
-        lambda camera: camera.cusum,
+        "cusum",
     ),
     (
         "esc_camera_trend_beyond",
         "1 while a control chart of the camera, EWMA or CUSUM, is beyond its limit.",
-        lambda camera: float(camera.beyond),
+        "beyond",
     ),
 )
-OF_LIVE_POSES: tuple[tuple[str, str, Callable[[LiveGauges], float | None]], ...] = (
+OF_LIVE_POSES = (
     (
         "esc_live_running",
         "1 while the process that sends the venue's live poses reports; absent after a day without reports.",
-        lambda live: float(live.running),
+        "running",
     ),
     (
         "esc_live_measured_ratio",
         "Share of the tracked cameras' pictures in which lines were measured, over the last one to two minutes.",
-        lambda live: live.measured_share,
+        "measured_share",
     ),
     (
         "esc_live_latency_p99_seconds",
         "Latency from the arrival of a picture to the sending of its pose, of the slowest camera over ten seconds.",
-        lambda live: live.latency_p99_s,
+        "latency_p99_s",
     ),
 )
-OF_A_VENUE: Mapping[str, Callable[[Any], str]] = {"venue": lambda figures: figures.venue}
-Figures = TypeVar("Figures", VenueGauges, AnchorRow, LiveGauges)
+# Counters of the database: name, help, labels, the key of the counter, and the closed set of what its labels can be.
+COUNTED: Sequence[tuple[str, str, Sequence[str], str, Sequence[tuple[str, ...]]]] = (
+    ("esc_jobs_ended", "Calibrations by their end.", ["status", "verdict", "error"], ENDED, OUTCOMES),
+    (
+        "esc_other_jobs_ended",
+        "Jobs of other kinds than calibrations by their end.",
+        ["kind", "status"],
+        OTHERS_ENDED,
+        OTHER_OUTCOMES,
+    ),
+    (
+        "esc_views",
+        "Cameras in calibrations by their frames: usable, or why not.",
+        ["condition"],
+        VIEWS,
+        [(condition,) for condition in VIEW_CONDITIONS],
+    ),
+    ("esc_job_restarts", "Attempts after a job's first one, whose worker died or was stopped.", [], RESTARTS, [()]),
+    ("esc_alarms_begun", "Alarms that began.", ["rule"], BEGUN, [(rule,) for rule in get_args(AlarmRule)]),
+    (
+        "esc_callbacks",
+        "Callbacks that will not be retried.",
+        ["outcome"],
+        CALLBACKS,
+        [("delivered",), ("given-up",), ("expired",)],
+    ),
+)
+# Histograms of the database: name, help, buckets, label and its values.
+TIMED: Sequence[tuple[str, str, HistogramBuckets, str, Sequence[str]]] = (
+    ("esc_job_wait_seconds", "Time from submission to start of calibrations.", WAIT, "", ()),
+    ("esc_job_duration_seconds", "Time from start to end of calibrations.", DURATION, "", ()),
+    ("esc_job_stage_duration_seconds", "Durations of stages of jobs with a result.", STAGE, "stage", STAGES),
+    ("esc_job_stitch_error_pixels", "Stitch errors of found poses; 1 px is 10 cm.", STITCH_ERROR, "", ()),
+    (
+        "esc_source_fetch_seconds",
+        "Durations of fetches from sources of cameras, by outcome.",
+        FETCH,
+        "outcome",
+        (FRAME, NONE),
+    ),
+)
 log = structlog.get_logger()
 
 
@@ -132,7 +166,7 @@ class _StoredMetrics(Collector):
             "esc_build", "The version.", {"version": build.version(), "commit": build.commit() or ""}
         )
         yield from self._room()
-        yield from _unreadable()
+        yield _unreadable()
         try:
             figures = self._read()
         except DATABASE_OUTAGES:
@@ -141,15 +175,25 @@ class _StoredMetrics(Collector):
             return
         yield _gauge("esc_database_up", "1 if the database answers.", 1)
         yield from _queue(figures)
-        yield from _jobs(figures.counters)
-        yield from _schedules(figures)
+        yield from _counters(figures.counters)
+        yield _gauges(
+            "esc_schedule_late_seconds",
+            "Delay of the schedule that has been due for longest, by the answers of its cameras the last time.",
+            ["cameras"],
+            zip([["answered"], ["slow-or-silent"]], figures.schedules_late_s, strict=True),
+        )
         # The worst of each, as many as the setting `metrics_venues` allows.
-        yield from _gauges(OF_VENUES, figures.venues, OF_A_VENUE)
-        yield from _gauges(OF_CAMERAS, figures.trends, {**OF_A_VENUE, "camera": lambda trend: trend.camera})
-        yield from _gauges(OF_LIVE_POSES, figures.live, OF_A_VENUE)
+        for families, rows, labels in (
+            (OF_VENUES, figures.venues, ["venue"]),
+            (OF_CAMERAS, figures.trends, ["venue", "camera"]),
+            (OF_LIVE_POSES, figures.live, ["venue"]),
+        ):
+            for name, meaning, figure in families:
+                samples = [([getattr(row, label) for label in labels], getattr(row, figure)) for row in rows]
+                yield _gauges(name, meaning, labels, samples)
         yield from _alarms(figures)
         yield from _workers(figures.workers, self._silence_s)
-        yield from _callbacks(figures)
+        yield _gauge("esc_callbacks_waiting", "Callbacks that are due or will be retried.", figures.callbacks_waiting)
 
     def _room(self) -> Iterator[Metric]:
         try:
@@ -165,142 +209,79 @@ class _StoredMetrics(Collector):
             )
 
 
-def _unreadable() -> Iterator[Metric]:
-    rows = GaugeMetricFamily(
+def _unreadable() -> Metric:
+    counts = unreadable_rows()
+    return _gauges(
         "esc_unreadable_rows",
         "Stored rows that this process could not read within the last hour; its log names them.",
-        labels=["kind"],
+        ["kind"],
+        [([kind], counts[kind]) for kind in get_args(RowKind)],
     )
-    counts = unreadable_rows()
-    for kind in get_args(RowKind):
-        rows.add_metric([kind], counts[kind])
-    yield rows
 
 
 def _queue(figures: StatisticsSnapshot) -> Iterator[Metric]:
-    jobs = GaugeMetricFamily("esc_queue_jobs", "Jobs in the queue.", labels=["priority"])
-    oldest = GaugeMetricFamily("esc_queue_oldest_age_seconds", "Age of the oldest queued job.", labels=["priority"])
-    for name, number in PRIORITIES.items():
-        waiting = figures.queue.get(number)
-        jobs.add_metric([name], waiting.jobs if waiting else 0)
-        oldest.add_metric([name], waiting.oldest_s if waiting else 0)
-    yield jobs
-    yield oldest
+    queued = [(name, figures.queue.get(number, QueuedJobs(0, 0))) for name, number in PRIORITIES.items()]
+    jobs = [([name], waiting.jobs) for name, waiting in queued]
+    yield _gauges("esc_queue_jobs", "Jobs in the queue.", ["priority"], jobs)
+    ages = [([name], waiting.oldest_s) for name, waiting in queued]
+    yield _gauges("esc_queue_oldest_age_seconds", "Age of the oldest queued job.", ["priority"], ages)
     yield _gauge("esc_jobs_running", "Running jobs.", figures.running)
 
 
-def _jobs(counters: Mapping[CounterKey, float]) -> Iterator[Metric]:
-    ended = CounterMetricFamily("esc_jobs_ended", "Calibrations by their end.", labels=["status", "verdict", "error"])
-    for outcome in OUTCOMES:
-        ended.add_metric(outcome, counters.get((ENDED, outcome), 0))
-    yield ended
-    others = CounterMetricFamily(
-        "esc_other_jobs_ended", "Jobs of other kinds than calibrations by their end.", labels=["kind", "status"]
-    )
-    for other in OTHER_OUTCOMES:
-        others.add_metric(other, counters.get((OTHERS_ENDED, other), 0))
-    yield others
-    views = CounterMetricFamily(
-        "esc_views", "Cameras in calibrations by their frames: usable, or why not.", labels=["condition"]
-    )
-    for condition in VIEW_CONDITIONS:
-        views.add_metric([condition], counters.get((VIEWS, (condition,)), 0))
-    yield views
-    restarts = counters.get((RESTARTS, ()), 0)
-    yield CounterMetricFamily(
-        "esc_job_restarts", "Attempts after a job's first one, whose worker died or was stopped.", value=restarts
-    )
-    yield _histogram("esc_job_wait_seconds", "Time from submission to start of calibrations.", WAIT, counters)
-    yield _histogram("esc_job_duration_seconds", "Time from start to end of calibrations.", DURATION, counters)
-    stages = HistogramMetricFamily(
-        "esc_job_stage_duration_seconds", "Durations of stages of jobs with a result.", labels=["stage"]
-    )
-    for stage in STAGES:
-        stages.add_metric([stage], *STAGE.read(counters, stage))
-    yield stages
-    yield _histogram(
-        "esc_job_stitch_error_pixels", "Stitch errors of found poses; 1 px is 10 cm.", STITCH_ERROR, counters
-    )
-
-
-def _schedules(figures: StatisticsSnapshot) -> Iterator[Metric]:
-    late = GaugeMetricFamily(
-        "esc_schedule_late_seconds",
-        "Delay of the schedule that has been due for longest, by the answers of its cameras the last time.",
-        labels=["cameras"],
-    )
-    for cameras, seconds in zip(("answered", "slow-or-silent"), figures.schedules_late_s, strict=True):
-        late.add_metric([cameras], seconds)
-    yield late
-    fetches = HistogramMetricFamily(
-        "esc_source_fetch_seconds", "Durations of fetches from sources of cameras, by outcome.", labels=["outcome"]
-    )
-    for outcome in (FRAME, NONE):
-        fetches.add_metric([outcome], *FETCH.read(figures.counters, outcome))
-    yield fetches
-
-
-def _gauges(
-    families: Sequence[tuple[str, str, Callable[[Figures], float | None]]],
-    figures: Sequence[Figures],
-    labels: Mapping[str, Callable[[Figures], str]],
-) -> Iterator[Metric]:
-    """Yield the gauges of venues or cameras, without samples for unknown values."""
-    for name, meaning, figure in families:
-        family = GaugeMetricFamily(name, meaning, labels=list(labels))
-        for one in figures:
-            value = figure(one)
-            if value is not None:
-                family.add_metric([label(one) for label in labels.values()], value)
-        yield family
+def _counters(counters: Mapping[CounterKey, float]) -> Iterator[Metric]:
+    """Yield what the database has counted, 0 where nothing was."""
+    for name, meaning, labels, metric, outcomes in COUNTED:
+        counted = CounterMetricFamily(name, meaning, labels=labels)
+        for outcome in outcomes:
+            counted.add_metric(outcome, counters.get((metric, outcome), 0))
+        yield counted
+    for name, meaning, buckets, label, values in TIMED:
+        timed = HistogramMetricFamily(name, meaning, labels=[label] if label else [])
+        for of in [[value] for value in values] or [[]]:
+            timed.add_metric(of, *buckets.read(counters, *of))
+        yield timed
 
 
 def _alarms(figures: StatisticsSnapshot) -> Iterator[Metric]:
-    active = GaugeMetricFamily("esc_alarms", "Active alarms of venues and cameras.", labels=["rule"])
-    begun = CounterMetricFamily("esc_alarms_begun", "Alarms that began.", labels=["rule"])
-    for rule in get_args(AlarmRule):
-        active.add_metric([rule], figures.alarms.get(rule, 0))
-        begun.add_metric([rule], figures.counters.get((BEGUN, (rule,)), 0))
-    of_venues = GaugeMetricFamily("esc_venue_alarm", "1 for an active alarm, oldest first.", labels=["venue", "rule"])
-    for alarm in figures.ringing:
-        of_venues.add_metric([alarm.venue, alarm.rule], 1)
-    yield from (active, begun, of_venues)
+    active = [([rule], figures.alarms.get(rule, 0)) for rule in get_args(AlarmRule)]
+    yield _gauges("esc_alarms", "Active alarms of venues and cameras.", ["rule"], active)
+    ringing = [([alarm.venue, alarm.rule], 1) for alarm in figures.ringing]
+    yield _gauges("esc_venue_alarm", "1 for an active alarm, oldest first.", ["venue", "rule"], ringing)
 
 
-def _workers(workers: list[WorkerHeartbeat], silence_s: float) -> Iterator[Metric]:
-    alive = [worker for worker in workers if worker.is_alive(silence_s)]
-    yield _gauge("esc_workers", "Workers with a recent heartbeat.", len(alive))
-    up = GaugeMetricFamily("esc_worker_up", "1 for a worker with a recent heartbeat.", labels=["worker"])
-    age = GaugeMetricFamily("esc_worker_heartbeat_age_seconds", "Time since its last heartbeat.", labels=["worker"])
+def _workers(workers: Sequence[WorkerHeartbeat], silence_s: float) -> Iterator[Metric]:
+    alive = [worker.is_alive(silence_s) for worker in workers]
+    yield _gauge("esc_workers", "Workers with a recent heartbeat.", sum(alive))
+    for name, meaning, values in (
+        ("esc_worker_up", "1 for a worker with a recent heartbeat.", alive),
+        ("esc_worker_heartbeat_age_seconds", "Time since its last heartbeat.", [one.silent_s for one in workers]),
+        (
+            "esc_worker_unreadable_jobs",
+            "Queued jobs that a worker cannot read since a newer version wrote them: they need a worker of that "
+            "version.",
+            [one.unreadable_jobs for one in workers],
+        ),
+    ):
+        names = [[worker.name] for worker in workers]
+        yield _gauges(name, meaning, ["worker"], zip(names, values, strict=True))
     model = InfoMetricFamily("esc_worker_model", "Network of a worker; empty: missing.", labels=["worker"])
-    builds = InfoMetricFamily("esc_worker_build", "Version of a worker; empty: 0.1.0.", labels=["worker"])
-    unreadable = GaugeMetricFamily(
-        "esc_worker_unreadable_jobs",
-        "Queued jobs that a worker cannot read since a newer version wrote them: they need a worker of that version.",
-        labels=["worker"],
-    )
+    builds = InfoMetricFamily("esc_worker_build", "Version of a worker; empty: unknown.", labels=["worker"])
     for worker in workers:
-        up.add_metric([worker.name], float(worker in alive))
-        if worker.silent_s is not None:
-            age.add_metric([worker.name], worker.silent_s)
         model.add_metric([worker.name], {"sha256": worker.model_sha256 or ""})
         builds.add_metric([worker.name], {"version": worker.version or ""})
-        unreadable.add_metric([worker.name], worker.unreadable_jobs)
-    yield from (up, age, model, builds, unreadable)
-
-
-def _callbacks(figures: StatisticsSnapshot) -> Iterator[Metric]:
-    yield _gauge("esc_callbacks_waiting", "Callbacks that are due or will be retried.", figures.callbacks_waiting)
-    finished = CounterMetricFamily("esc_callbacks", "Callbacks that will not be retried.", labels=["outcome"])
-    for outcome in ("delivered", "given-up", "expired"):
-        finished.add_metric([outcome], figures.counters.get((CALLBACKS, (outcome,)), 0))
-    yield finished
+    yield from (model, builds)
 
 
 def _gauge(name: str, meaning: str, value: float) -> Metric:
     return GaugeMetricFamily(name, meaning, value=value)
 
 
-def _histogram(name: str, meaning: str, buckets: HistogramBuckets, counters: Mapping[CounterKey, float]) -> Metric:
-    cumulative, total = buckets.read(counters)
-    return HistogramMetricFamily(name, meaning, buckets=cumulative, sum_value=total)
+def _gauges(
+    name: str, meaning: str, labels: Sequence[str], samples: Iterable[tuple[list[str], float | datetime | None]]
+) -> Metric:
+    """Return a gauge with a sample for each of several labels; an unknown value (None) makes none."""
+    family = GaugeMetricFamily(name, meaning, labels=labels)
+    for values, value in samples:
+        if value is not None:
+            family.add_metric(values, value.timestamp() if isinstance(value, datetime) else value)
+    return family

@@ -212,7 +212,9 @@ venue_quality = sa.Table(
     "venue_quality",
     metadata,
     sa.Column("venue", sa.String(64), primary_key=True),
+    # Of the poses in use since the last result: of the new ones if they were accepted, or else of those before.
     sa.Column("stitch_error_px", sa.Double),
+    # How far the picture of the pitch was found to have moved, at the camera that moved most.
     sa.Column("moved_px", sa.Double),
     # The time at which the poses in use were accepted; null: they were put.
     sa.Column("accepted_at", Instant),

@@ -1,8 +1,9 @@
 """The statistics that /metrics shows, read in one transaction from rows that are few or indexed."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
+from typing import Any
 
 import sqlalchemy as sa
 
@@ -20,6 +21,8 @@ from service.store.workers import WorkerHeartbeat, heartbeats
 j = tables.jobs.c
 q = tables.venue_quality.c
 a = tables.alarms.c
+ALARMS = sa.select(a.rule, sa.func.count().label("alarms")).group_by(a.rule)
+RINGING = sa.select(a.venue, a.rule).group_by(a.venue, a.rule).order_by(sa.func.min(a.since))
 
 
 @dataclass(frozen=True)
@@ -31,40 +34,20 @@ class QueuedJobs:
 
 
 @dataclass(frozen=True)
-class VenueGauges:
-    """Figures of a venue from its last result.
-
-    `stitch_error_px` is that of the poses that hold since then: of the new ones if they were accepted, or else of those
-    before. `moved_px`: how far the picture of the pitch was found to have moved, at the camera that moved most.
-    `drift_px`: the same since a camera was put where it is, by the poses that hold.
-    """
-
-    venue: str
-    stitch_error_px: float | None
-    moved_px: float | None
-    accepted_at: datetime | None
-    drift_px: float | None = None
-
-
-@dataclass(frozen=True)
-class ActiveAlarm:
-    """An alarm of a venue, of one of its cameras or of several."""
-
-    venue: str
-    rule: str
-
-
-@dataclass(frozen=True)
 class StatisticsSnapshot:
-    """Statistics of the database for /metrics, at one moment."""
+    """Statistics of the database for /metrics, at one moment.
+
+    `venues`: rows of `venue_quality`; `alarms`: the number of active ones by rule; `ringing`: venue and rule of those
+    that have been active longest, whichever the camera.
+    """
 
     queue: Mapping[int, QueuedJobs]
     running: int
     callbacks_waiting: int
     workers: list[WorkerHeartbeat]
-    venues: list[VenueGauges]
+    venues: Sequence[Any]
     alarms: Mapping[str, int]
-    ringing: list[ActiveAlarm]
+    ringing: Sequence[Any]
     trends: list[AnchorRow]
     live: list[LiveGauges]
     # Seconds that a schedule has been due at most: where its cameras answer, and where they are slow or gave no frame.
@@ -83,11 +66,13 @@ def read_statistics(engine: sa.Engine, most_venues: int) -> StatisticsSnapshot:
         return StatisticsSnapshot(
             queue=queue,
             running=running,
-            callbacks_waiting=_callbacks_waiting(connection),
+            callbacks_waiting=connection.execute(
+                sa.select(sa.func.count()).where(tables.deliveries.c.status == "waiting")
+            ).scalar_one(),
             workers=heartbeats(connection, now),
             venues=_venues(connection, most_venues),
-            alarms=_alarms(connection),
-            ringing=_ringing(connection, most_venues),
+            alarms={row.rule: row.alarms for row in connection.execute(ALARMS)},
+            ringing=connection.execute(RINGING.limit(most_venues)).all(),
             trends=most_moved(connection, most_venues),
             live=live_gauges(connection, most_venues, now),
             schedules_late_s=lateness_s(connection, now),
@@ -109,27 +94,8 @@ def _queue(connection: sa.Connection, now: datetime) -> tuple[dict[int, QueuedJo
     return queue, sum(row.jobs for row in rows if row.status == "running")
 
 
-def _callbacks_waiting(connection: sa.Connection) -> int:
-    waiting = sa.select(sa.func.count()).where(tables.deliveries.c.status == "waiting")
-    return connection.execute(waiting).scalar_one()
-
-
-def _venues(connection: sa.Connection, most: int) -> list[VenueGauges]:
+def _venues(connection: sa.Connection, most: int) -> list[Any]:
     quality, error = sa.select(tables.venue_quality), q.stitch_error_px
     # Two looks at an index, not one at every venue: one camera has no stitch error.
     rows = list(connection.execute(quality.where(error.is_not(None)).order_by(error.desc()).limit(most)))
-    rows += connection.execute(quality.where(error.is_(None)).limit(most - len(rows)))
-    return [VenueGauges(row.venue, row.stitch_error_px, row.moved_px, row.accepted_at, row.drift_px) for row in rows]
-
-
-def _alarms(connection: sa.Connection) -> dict[str, int]:
-    """Return the number of active alarms by rule."""
-    query = sa.select(a.rule, sa.func.count().label("alarms")).group_by(a.rule)
-    return {row.rule: row.alarms for row in connection.execute(query)}
-
-
-def _ringing(connection: sa.Connection, most: int) -> list[ActiveAlarm]:
-    """Return the alarms that have been active longest, whichever the camera."""
-    since = sa.func.min(a.since)
-    query = sa.select(a.venue, a.rule).group_by(a.venue, a.rule).order_by(since).limit(most)
-    return [ActiveAlarm(row.venue, row.rule) for row in connection.execute(query)]
+    return rows + list(connection.execute(quality.where(error.is_(None)).limit(most - len(rows))))
