@@ -9,9 +9,8 @@ from pydantic import AfterValidator
 from service.api.auth import Authenticator
 from service.api.change_watch import FILE_INTERVAL_S, INTERVAL_S, ChangeWatch, ClientSlots
 from service.api.programs.camera_views import CameraViews
-from service.api.programs.clicked_pose import ClickedPoses
 from service.api.programs.drawings import Drawings
-from service.api.programs.plans import Plans
+from service.api.programs.program_pool import ProgramPool
 from service.api.programs.stitches import Stitches
 from service.api.shared_reads import SharedReads
 from service.api.uploads import Uploads
@@ -49,9 +48,19 @@ class Context(ApplicationState):
         self.readiness = Readiness(settings.home_database_url, self.blobs, self.disk, silence_s)
         self.authenticator = Authenticator(self.keys, self.sessions, settings)
         self.uploads = Uploads(settings)
-        self.clicked_poses = ClickedPoses(settings)
+        native = settings.native_environment
+        self.clicked_poses = ProgramPool(
+            # Clicks come a second apart; a pose takes less.
+            "first pose",
+            settings.pose_program,
+            native,
+            60,
+            busy="Another first pose is being made.",
+            again_s=1,
+        )
+        # As many cameras as may be planned take half a minute of a core, which others may need as well.
+        self.plans = ProgramPool("plan", settings.plan_program, native, 120, busy="Another plan is being made.")
         self.drawings = Drawings(settings, self.jobs, self.blobs)
-        self.plans = Plans(settings)
         self.stitches = Stitches(settings)
         self.camera_views = CameraViews(self.snapshots)
 

@@ -24,6 +24,6 @@ def write(
         raise Problem("unavailable", "Another set of ST maps is being made.", headers={"Retry-After": "10"})
     try:
         given = camera.camera.model_dump_json().encode()
-        return run_program("set of ST maps", [*program, origin], environment, given, LONGEST_S)
+        return run_program("set of ST maps", [*program, origin], environment, LONGEST_S, given)
     finally:
         _turn.release()

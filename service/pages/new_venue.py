@@ -87,7 +87,7 @@ async def calibration(request: Request, context: InContext, sender: FromSender) 
 @data.post("/pose", openapi_extra=needs_scope("calibrate"))
 async def pose(clicked: ClickedPoseRequest, context: InContext) -> ClickedPose:
     """Answer the pose of a camera by the points that were clicked so far."""
-    return await context.clicked_poses.find(clicked)
+    return ClickedPose.model_validate_json(await context.clicked_poses.run(clicked.model_dump_json().encode()))
 
 
 def _polyline(shape: Shape) -> list[Point]:

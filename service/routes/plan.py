@@ -37,5 +37,5 @@ async def plan_site(
             f"Expected at most {MOST_CAMERAS} cameras, got {cameras}: plan a part of them at a time, or all of them "
             "with `esc plan`.",
         )
-    made = await context.plans.make(PlanRequest(site=site, lines=lines, hidden=hidden))
+    made = await context.plans.run(PlanRequest(site=site, lines=lines, hidden=hidden).model_dump_json().encode())
     return Response(made, media_type="application/json")

@@ -11,7 +11,7 @@ from weakref import WeakValueDictionary
 
 from starlette.concurrency import run_in_threadpool
 
-from service.api.programs.program_pool import ProgramPool, run_program, turn_of
+from service.api.programs.program_pool import ProgramPool, turn_of
 from service.schemas.programs.drawing import DrawingRequest
 from service.schemas.programs.files import ProgramMessage
 from service.settings import Settings
@@ -26,8 +26,14 @@ class Drawings:
     """Draws pictures of jobs by a program, `ESC_PICTURES_AT_ONCE` of them at once."""
 
     def __init__(self, settings: Settings, jobs: JobRepository, blobs: Blobs) -> None:
-        self._settings, self._jobs, self._blobs = settings, jobs, blobs
-        self._pool = ProgramPool("picture", LONGEST_S, at_once=settings.pictures_at_once)
+        self._threads, self._jobs, self._blobs = settings.threads, jobs, blobs
+        self._pool = ProgramPool(
+            "picture",
+            settings.picture_program,
+            settings.native_environment,
+            LONGEST_S,
+            at_once=settings.pictures_at_once,
+        )
         # One for each set of pictures that are drawn together, so that nobody else draws it meanwhile.
         self._drawing: WeakValueDictionary[str, asyncio.Lock] = WeakValueDictionary()
 
@@ -51,10 +57,8 @@ class Drawings:
         if job is None or None in frames.values():
             return None
         files = {camera: frame for camera, frame in frames.items() if frame is not None}
-        asked = DrawingRequest.of(job.venue, job.result, drawn_together(name), self._settings.threads)
-        program, environment = self._settings.picture_program, self._settings.native_environment
-        output = run_program("picture", program, environment, asked.encode(files), LONGEST_S)
-        _, drawn = ProgramMessage.decode(output)
+        asked = DrawingRequest.of(job.venue, job.result, drawn_together(name), self._threads)
+        _, drawn = ProgramMessage.decode(self._pool.run_at_once(asked.encode(files)))
         for each, picture in drawn.items():
             self._blobs.put(f"{pictures.folder}/{picture_file(each)}", picture)
         self._forget_if_gone(job_id)

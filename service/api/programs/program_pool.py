@@ -23,16 +23,30 @@ BUSY = "Other pictures are being drawn."
 class ProgramPool:
     """Runs of a program, `at_once` of them; other requests wait for their turn without a thread, which all need."""
 
-    def __init__(self, name: str, longest_s: float, *, at_once: int = 1, busy: str = BUSY, again_s: int = 2) -> None:
-        """`name`: what a run makes; `busy`, `again_s`: see `turn_of`."""
-        self._name, self._longest_s = name, longest_s
+    def __init__(
+        self,
+        name: str,
+        command: Sequence[str],
+        environment: Mapping[str, str],
+        longest_s: float,
+        *,
+        at_once: int = 1,
+        busy: str = BUSY,
+        again_s: int = 2,
+    ) -> None:
+        """`name`: what a run makes; `environment`, `longest_s`: see `run_program`; `busy`, `again_s`: see `turn_of`."""
+        self._arguments = name, command, environment, longest_s
         self._busy, self._again_s = busy, again_s
         self._turns = asyncio.Semaphore(at_once)
 
-    async def run(self, command: Sequence[str], environment: Mapping[str, str], given: bytes) -> bytes:
-        """Return what `run_program` does, in turn."""
+    async def run(self, given: bytes) -> bytes:
+        """Return what the program answers to `given` bytes, in turn."""
         async with self.turn():
-            return await run_in_threadpool(run_program, self._name, command, environment, given, self._longest_s)
+            return await run_in_threadpool(self.run_at_once, given)
+
+    def run_at_once(self, given: bytes) -> bytes:
+        """Return what the program answers, in the thread of the caller, who has a turn."""
+        return run_program(*self._arguments, given)
 
     def turn(self) -> AbstractAsyncContextManager[None]:
         """Hold one of the places of the pool."""
@@ -54,7 +68,7 @@ async def turn_of(lock: asyncio.Lock | asyncio.Semaphore, busy: str = BUSY, agai
 
 
 def run_program(
-    name: str, command: Sequence[str], environment: Mapping[str, str], given: bytes, longest_s: float
+    name: str, command: Sequence[str], environment: Mapping[str, str], longest_s: float, given: bytes
 ) -> bytes:
     """Return what a program writes to its standard output when it is `given` bytes on its standard input.
 

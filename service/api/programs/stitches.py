@@ -23,10 +23,10 @@ class Stitches:
     """Makes packages and previews by a program."""
 
     def __init__(self, settings: Settings) -> None:
-        self._settings = settings
-        busy = "Packages of others are being made."
-        self._packages = ProgramPool("package of a stitched view", PACKAGE_S, busy=busy)
-        self._previews = ProgramPool("preview", PREVIEW_S)
+        self._threads = settings.threads
+        program, busy = (settings.stitch_program, settings.native_environment), "Packages of others are being made."
+        self._packages = ProgramPool("package of a stitched view", *program, PACKAGE_S, busy=busy)
+        self._previews = ProgramPool("preview", *program, PREVIEW_S)
         # Keys of which a package is made or waits.
         self._owners: set[str] = set()
 
@@ -39,7 +39,7 @@ class Stitches:
                 "cameras": venue.poses_and_lenses,
                 "lights": venue.lights,
                 "revision": revision,
-                "threads": self._settings.threads,
+                "threads": self._threads,
                 **wanted,
             }
         )
@@ -49,10 +49,9 @@ class Stitches:
         if owner in self._owners:
             why = "Another package of this key is being made."
             raise Problem("unavailable", why, headers={"Retry-After": "5"})
-        program, environment = self._settings.stitch_program, self._settings.native_environment
         self._owners.add(owner)
         try:
-            return await self._packages.run(program, environment, asked.encode({}))
+            return await self._packages.run(asked.encode({}))
         finally:
             self._owners.remove(owner)
 
@@ -65,5 +64,4 @@ class Stitches:
             "height_px": None if height is None else max(2, 2 * round(height * small / width / 2)),
         }
         smaller = asked.model_copy(update={"view": asked.view.but(changes)})
-        program, environment = self._settings.stitch_program, self._settings.native_environment
-        return await self._previews.run(program, environment, smaller.encode(frames))
+        return await self._previews.run(smaller.encode(frames))
