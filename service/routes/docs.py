@@ -29,19 +29,14 @@ async def page(context: InContext) -> Response:
     return HTMLResponse(with_root_path(text, context.settings.root_path), headers={"Content-Security-Policy": POLICY})
 
 
-@router.get("/rapidoc-min.js", openapi_extra=FOR_ALL)
-async def script() -> FileResponse:
-    """Return RapiDoc 9.3.8, which draws the page."""
-    return FileResponse(FILES / "rapidoc-min.js", media_type="text/javascript")
+def _serve(name: str, media_type: str) -> None:
+    async def file() -> FileResponse:
+        return FileResponse(FILES / name, media_type=media_type)
+
+    router.add_api_route(f"/{name}", file, name=name, openapi_extra=FOR_ALL)
 
 
-@router.get("/scheme.js", openapi_extra=FOR_ALL)
-async def scheme() -> FileResponse:
-    """Return the script that tells RapiDoc whether the browser prefers dark colours."""
-    return FileResponse(FILES / "scheme.js", media_type="text/javascript")
-
-
-@router.get("/LICENSE.txt", openapi_extra=FOR_ALL)
-async def licence() -> FileResponse:
-    """Return the licence of RapiDoc."""
-    return FileResponse(FILES / "LICENSE.txt", media_type="text/plain")
+# RapiDoc 9.3.8, which draws the page, its licence, and what tells it whether the browser prefers dark colours.
+_serve("rapidoc-min.js", "text/javascript")
+_serve("LICENSE.txt", "text/plain")
+_serve("scheme.js", "text/javascript")

@@ -6,20 +6,18 @@ from fastapi import APIRouter, Path, Response
 from starlette.concurrency import run_in_threadpool
 
 from service.api.context import CameraIdPath, Context, InContext
-from service.routes.contract.documented import BINARY, needs_scope
+from service.routes.contract.documented import BINARY, PICTURE, needs_scope
 from service.routes.contract.guarded import Guarded
 from service.routes.contract.problem_docs import problem_responses
 from service.routes.jobs import ExistingJob
-from service.schemas.file_kinds import PNG_START
+from service.schemas.file_kinds import picture_media_type
 from service.schemas.job import Job
 from service.schemas.problems import Problem
 from service.store.blobs import DamagedBlob
-from service.store.jobs.files import picture_file
 from service.store.jobs.queries import Pictures
 
 router = APIRouter(prefix="/jobs", tags=["jobs"], route_class=Guarded)
 
-PNG, JPEG = "image/png", "image/jpeg"
 # Name of the route, address below that of the job, description. The picture's name is the address without its suffix,
 # with underscores for slashes.
 PICTURES = (
@@ -71,7 +69,6 @@ def _show(route: str, address: str, shows: str) -> None:
     ) -> Response:
         return await _picture(context, job, name.format(camera=camera, number=number))
 
-    content = {PNG if suffix == "png" else JPEG: BINARY}
     router.add_api_route(
         f"/{{job_id}}/{address}",
         of_candidate if "{number}" in address else of_camera if "{camera}" in address else of_job,
@@ -79,7 +76,10 @@ def _show(route: str, address: str, shows: str) -> None:
         description=shows,
         openapi_extra=needs_scope("read"),
         response_class=Response,
-        responses={200: {"content": content}, **problem_responses("picture-not-found", "picture-deleted")},
+        responses={
+            200: {"content": {"image/png" if suffix == "png" else "image/jpeg": BINARY}},
+            **problem_responses("picture-not-found", "picture-deleted"),
+        },
     )
 
 
@@ -91,8 +91,11 @@ async def _picture(context: Context, job: Job, name: str) -> Response:
     data = None if pictures.deleted else await context.drawings.picture(job.id, pictures, name)
     if data is None:
         raise Problem("picture-deleted", _why_deleted(pictures, context.settings.keep_pictures_days), job=job.id)
-    media_type = PNG if picture_file(name).endswith(".png") else JPEG
-    return Response(data, media_type=media_type, headers={"Cache-Control": "private, max-age=3600"})
+    return _shown(data)
+
+
+def _shown(data: bytes) -> Response:
+    return Response(data, media_type=picture_media_type(data), headers={"Cache-Control": "private, max-age=3600"})
 
 
 def _why_deleted(pictures: Pictures, keep_days: float) -> str:
@@ -109,10 +112,7 @@ for each in PICTURES:
     "/{job_id}/frames/{number}",
     openapi_extra=needs_scope("read"),
     response_class=Response,
-    responses={
-        200: {"content": {JPEG: BINARY, PNG: BINARY}},
-        **problem_responses("picture-not-found", "frames-deleted"),
-    },
+    responses={200: {"content": PICTURE}, **problem_responses("picture-not-found", "frames-deleted")},
 )
 def get_frame(
     job: ExistingJob,
@@ -131,5 +131,4 @@ def get_frame(
     if data is None:
         kept = f"{context.settings.keep_frames_days:g} days"
         raise Problem("frames-deleted", f"It never had any, or they were deleted {kept} after its end.", job=job.id)
-    media_type = PNG if data.startswith(PNG_START) else JPEG
-    return Response(data, media_type=media_type, headers={"Cache-Control": "private, max-age=3600"})
+    return _shown(data)

@@ -7,9 +7,8 @@ from fastapi import APIRouter, Query, Response
 from service.api.context import InContext
 from service.routes.contract.documented import needs_scope
 from service.routes.contract.guarded import Guarded
-from service.schemas.plan import HiddenShare, LineStateName, PlanAnswer, PlannedSite
+from service.schemas.plan import HiddenShare, LineStateName, PlanAnswer, PlannedSite, PlanRequest
 from service.schemas.problems import Problem
-from service.schemas.programs.planning import PlanRequest
 
 router = APIRouter(tags=["venues"], route_class=Guarded)
 # A plan takes as long as the cube of the number of its cameras.

@@ -12,7 +12,7 @@ from service.api.programs.drawings import drawable_frame
 from service.routes.contract.documented import BINARY, header_docs, needs_scope
 from service.routes.contract.guarded import Guarded
 from service.routes.contract.problem_docs import problem_responses
-from service.routes.contract.tagged import TAGGED, IfNoneMatch, tagged_response
+from service.routes.contract.tagged import TAGGED, IfNoneMatch, is_known, tagged_response
 from service.routes.venues import ExistingVenue
 from service.schemas import etags
 from service.schemas.names import Projection, StitchFormat
@@ -73,13 +73,11 @@ async def export_stitched_view(
     revision = await run_in_threadpool(_revision, context, venue)
     asked = context.stitches.asked(venue, revision, view=view.of(venue), wanted=form, tag="")
     made_of = _made_of(asked)
-    tag = etags.of(made_of)
-    if if_none_match is not None and etags.matches(if_none_match, tag, weakly=True):
+    if is_known(made_of, if_none_match):
         return tagged_response(made_of, if_none_match, Response)
     key = request.state.key
-    content = await context.stitches.package(
-        asked.model_copy(update={"tag": etags.quoted(tag)}), "" if key is None else key.name
-    )
+    tagged = asked.model_copy(update={"tag": etags.quoted(etags.of(made_of))})
+    content = await context.stitches.package(tagged, "" if key is None else key.name)
     head = {"Content-Disposition": f'attachment; filename="{venue.id}-stitch-{form}.zip"'}
     return tagged_response(made_of, None, lambda: Response(content, headers=head, media_type=ZIP))
 
@@ -107,8 +105,7 @@ async def draw_stitched_view(
     asked = context.stitches.asked(venue, revision, tag="", **choice)
     job = await run_in_threadpool(context.past_calibrations.last_taken, venue.id)
     made_of = _made_of(asked) + (job or "").encode()
-    tag = etags.of(made_of)
-    if if_none_match is not None and etags.matches(if_none_match, tag, weakly=True):
+    if is_known(made_of, if_none_match):
         return tagged_response(made_of, if_none_match, Response)
     frames = await run_in_threadpool(_frames, context, venue, job)
     picture = await context.stitches.preview(asked, frames)

@@ -53,6 +53,11 @@ def kind_of_file(data: bytes) -> str | None:
     return "SVG" if text.startswith(b"<svg") else "XML" if text.startswith(b"<?xml") else None
 
 
+def picture_media_type(data: bytes) -> str:
+    """Return the media type of a file that is PNG or else JPEG."""
+    return "image/png" if data.startswith(PNG_START) else "image/jpeg"
+
+
 def jpeg_begins_at(data: bytes) -> int:
     """Return the offset at which the JPEG of a file begins, 0 for all other files.
 

@@ -33,7 +33,19 @@ CAUSES = (
 Cause = Literal["put", "calibrated", "recovered", "accepted", "restored", "adopted", "found"]
 
 
-class Revision(Schema):
+class PosesOrigin(Schema):
+    """Origin of the poses of a venue: revision, cause and job."""
+
+    revision: int = Field(description="Revision in the history of the venue, from 1; the highest one is in use.")
+    cause: Annotated[Cause, OPEN_WORD] = Field(description=f"Cause of the revision: {CAUSES}")
+    job: str | None = Field(
+        description="Job that found these poses; for a restored revision, the job whose poses were rejected by hand."
+    )
+    stitch_error_px: float | None = Field(description="Stitch error by the job; null: not measured.")
+    ridge: list[Row] | None = Field(description="Ridge that the poses belong to, as in the field; null: flat.")
+
+
+class Revision(PosesOrigin):
     """Poses of a venue from a moment on, with the lenses and the ridge that they belong to."""
 
     model_config = ConfigDict(
@@ -66,15 +78,8 @@ class Revision(Schema):
         }
     )
 
-    revision: int = Field(description="Number of the revision, from 1; the newest is in use.")
     at: datetime = Field(description="Time since which it is in use.")
-    cause: Annotated[Cause, OPEN_WORD] = Field(description=f"Cause of the change: {CAUSES}")
-    job: str | None = Field(
-        description="Job that found these poses; for a restored revision, the job whose poses were rejected by hand."
-    )
     restored_from: int | None = Field(description="Number of the revision that was restored.")
-    stitch_error_px: float | None = Field(description="Stitch error by the job; null: not measured.")
-    ridge: list[Row] | None = Field(description="Ridge that the poses belong to, as in the field; null: flat.")
     field_numbers: dict[Annotated[FieldNumber, OPEN_WORD], NumberChange] = Field(
         {}, description="Dimensions of the field that were adopted or restored with it, by name; otherwise {}."
     )

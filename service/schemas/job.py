@@ -63,7 +63,32 @@ def _read_result(result: Any, check: ValidatorFunctionWrapHandler, info: Validat
     return check({"kind": kind} | result if isinstance(result, dict) else result)
 
 
-class Job(Schema):
+class JobBase(Schema):
+    """State and progress of a job, without its result."""
+
+    id: str = Field(description="Id of the job.")
+    kind: Annotated[JobKind, OPEN_WORD] = Field(
+        "calibration", description="Kind of computation, which decides what `result` has."
+    )
+    venue: str | None = Field(
+        description="Id of the venue; null for the intrinsics of a lens. For a search for cameras, the venue need not "
+        "be stored yet."
+    )
+    status: Annotated[JobStatus, OPEN_WORD] = Field(description="State of the job; the last three are final.")
+    progress: Progress | None
+    attempt: int = Field(description="Number of starts of the job; above 1 after a crash of its worker.")
+    created_at: datetime = Field(description="Time of its submission.")
+    started_at: datetime | None = Field(description="Time of its first start; null while queued.")
+    finished_at: datetime | None = Field(description="Time of its end; null while open.")
+    error: JobError | None
+    asked_by: str | None = Field(
+        None,
+        description="Submitter. `key NAME`: this API key; `schedule`: the venue's schedule; `another key`: shown to a "
+        "key that is limited to some venues, for any key but itself; null: the service asked for no key.",
+    )
+
+
+class Job(JobBase):
     """A computation of a worker: its state, its progress, and in the end its result or its error."""
 
     model_config = ConfigDict(
@@ -93,22 +118,7 @@ class Job(Schema):
         }
     )
 
-    id: str = Field(description="Id of the job.")
-    kind: Annotated[JobKind, OPEN_WORD] = Field(
-        "calibration", description="Kind of computation, which decides what `result` has."
-    )
-    venue: str | None = Field(
-        description="Id of the venue; null for the intrinsics of a lens. For a search for cameras, the venue need not "
-        "be stored yet."
-    )
-    status: Annotated[JobStatus, OPEN_WORD] = Field(description="State of the job; the last three are final.")
-    progress: Progress | None
     queue_position: int | None = Field(description="Position in the queue, 1 = next; null unless queued.")
-    attempt: int = Field(description="Number of starts of the job; above 1 after a crash of its worker.")
-    created_at: datetime = Field(description="Time of its submission.")
-    started_at: datetime | None = Field(description="Time of its first start; null while queued.")
-    finished_at: datetime | None = Field(description="Time of its end; null while open.")
-    error: JobError | None
     result: Annotated[AnyResult | None, WrapValidator(_read_result)] = Field(
         description="Result, by the kind of job; null before its end, and of a job that failed or was cancelled."
     )
@@ -117,11 +127,6 @@ class Job(Schema):
     )
     venue_revision: int | None = Field(
         None, description="Revision of the venue that its poses became, automatically or by hand; null: none."
-    )
-    asked_by: str | None = Field(
-        None,
-        description="Submitter. `key NAME`: this API key; `schedule`: the venue's schedule; `another key`: shown to a "
-        "key that is limited to some venues, for any key but itself; null: the service asked for no key.",
     )
     options: dict[str, Any] = Field(
         {}, description="Options of the job with all defaults and the seed filled in, without `callback_url`."
@@ -168,22 +173,11 @@ class JobEvent(Attributed):
         return cls.model_validate({"type": f"job.{job.status}", "timestamp": job.finished_at, "data": data})
 
 
-class JobSummary(Schema):
+class JobSummary(JobBase):
     """Summary of a job: state and progress, without its result."""
 
-    id: str = Field(description="Id of the job.")
-    kind: Annotated[JobKind, OPEN_WORD] = Field(description="Kind of computation.")
-    venue: str | None = Field(description="Id of the venue; null for the intrinsics of a lens.")
-    status: Annotated[JobStatus, OPEN_WORD] = Field(description="State of the job.")
-    progress: Progress | None
-    attempt: int = Field(description="Number of starts.")
-    created_at: datetime = Field(description="Time of its submission.")
-    started_at: datetime | None = Field(description="Time of its first start; null while queued.")
-    finished_at: datetime | None = Field(description="Time of its end; null while open.")
-    error: JobError | None
     verdict: str | None = Field(description="Verdict of a calibration's result.")
     stitch_error_px: float | None = Field(description="Stitch error of a calibration's result.")
-    asked_by: str | None = Field(description="Submitter, as in the job.")
 
 
 class Jobs(Schema):

@@ -160,6 +160,14 @@ def _sought(planned: "PlannedCameraResult", given: PlannedCameraIn | None) -> So
     )
 
 
+class PlanRequest(Schema):
+    """Request of the program that plans cameras: a site, and what its lines are expected to be like."""
+
+    site: PlannedSite
+    lines: LineStateName
+    hidden: HiddenShare
+
+
 class Spread(Schema):
     """Values over the field in view: the `median`, and `worst`, which only 5 % of it exceed."""
 

@@ -11,7 +11,7 @@ from service.schemas.base import OPEN_WORD, Id, OpenChoice, Schema
 from service.schemas.check import CheckResult
 from service.schemas.field import FieldOfPlay
 from service.schemas.geometry import Intrinsics, Light, Moved, Pose, Row
-from service.schemas.names import FieldNumber, Verdict
+from service.schemas.names import FieldNumber, Verdict, refusal_uri
 from service.schemas.options import Coordinates, Landmark
 from service.schemas.trend import Displacement
 
@@ -341,6 +341,22 @@ class Result(Schema):
     def accepted_cameras(self) -> list[str]:
         """Ids of the cameras whose poses may replace the stored ones."""
         return [camera.id for camera in self.cameras if camera.accepted]
+
+    def refused(self, because: str, reason: str = "all-or-none") -> "Result":
+        """Return the result with every pose refused, for a reason of `REFUSAL_REASONS` (`service.schemas.problems`).
+
+        The reasons that it was rejected for before stay.
+        """
+        refusal = {"accepted": False, "rejected_because": because, "refusal": refusal_uri(reason)}
+        cameras = [
+            camera.model_copy(update={"accepted": False} if camera.rejected_because else refusal)
+            for camera in self.cameras
+        ]
+        reasons = [because] if self.rejected_because is None else [self.rejected_because, because]
+        summary = "; ".join(one.removesuffix(".") for one in reasons)
+        return self.model_copy(
+            update={"verdict": "rejected", "accepted": False, "rejected_because": summary, "cameras": cameras}
+        )
 
 
 class PhotoResult(Schema):

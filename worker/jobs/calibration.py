@@ -11,7 +11,6 @@ from typing import Any
 from service.schemas.job import Progress
 from service.schemas.lens_map import lens_warnings
 from service.schemas.options import Options
-from service.schemas.refusals import refuse
 from service.schemas.results import AdoptableNumber, CameraResult, Result, Suspicion, View
 from service.schemas.trend import Anchor
 from service.schemas.venue import Venue
@@ -243,7 +242,7 @@ def _refused_in_part(venue: Venue, options: Options, result: Result) -> Result:
     if result.verdict != "partly":
         return result
     if venue.accept == "all":
-        return refuse(result, "the venue accepts the poses of all cameras or none")
+        return result.refused("the venue accepts the poses of all cameras or none")
     if options.fit_ridge:
-        return refuse(result, "a ridge is accepted with the poses of all cameras or not at all")
+        return result.refused("a ridge is accepted with the poses of all cameras or not at all")
     return result

@@ -7,8 +7,7 @@ import sys
 from base64 import b64encode
 
 from service import child_process
-from service.schemas.plan import PlanAnswer
-from service.schemas.programs.planning import PlanRequest
+from service.schemas.plan import PlanAnswer, PlanRequest
 from worker.jobs import planning
 
 

@@ -19,6 +19,7 @@ HEADERS: dict[str, dict[str, Any]] = {
 }
 FILE: dict[str, Any] = {"type": "string", "format": "binary"}
 BINARY = {"schema": FILE}
+PICTURE = {"image/jpeg": BINARY, "image/png": BINARY}
 # `openapi_extra` of a route that anybody may call.
 FOR_ALL: dict[str, Any] = {"security": []}
 

@@ -23,11 +23,14 @@ def tagged_response(
     made_of: bytes, if_none_match: str | None, whole: Callable[[], Response], kept: str = "no-cache"
 ) -> Response:
     """Return the `whole` response, or 304. `made_of`: its content or sources; `kept`: its `Cache-Control`."""
-    tag = etags.of(made_of)
-    known = if_none_match is not None and etags.matches(if_none_match, tag, weakly=True)
-    answer = Response(status_code=304) if known else whole()
-    answer.headers.update({"ETag": etags.quoted(tag), "Cache-Control": kept})
+    answer = Response(status_code=304) if is_known(made_of, if_none_match) else whole()
+    answer.headers.update({"ETag": etags.quoted(etags.of(made_of)), "Cache-Control": kept})
     return answer
+
+
+def is_known(made_of: bytes, if_none_match: str | None) -> bool:
+    """True if the client has the content already."""
+    return if_none_match is not None and etags.matches(if_none_match, etags.of(made_of), weakly=True)
 
 
 def tagged_json(content: BaseModel, if_none_match: str | None, status: int = 200) -> Response:

@@ -7,10 +7,10 @@ from typing import Annotated, Literal, get_args
 from pydantic import Field
 
 from service.schemas.actor import Attributed
-from service.schemas.base import OPEN_WORD, Id, OpenChoice, Schema, is_empty
-from service.schemas.geometry import PictureMotion, PosedCamera, Row
+from service.schemas.base import Id, OpenChoice, Schema, is_empty
+from service.schemas.geometry import PictureMotion, PosedCamera
 from service.schemas.health import AlarmEvent
-from service.schemas.history import CAUSES, Cause
+from service.schemas.history import PosesOrigin
 from service.schemas.job import JobEvent
 from service.schemas.names import EventKind
 
@@ -18,17 +18,10 @@ from service.schemas.names import EventKind
 FINAL_EVENT = "venue.deleted"
 
 
-class Poses(Schema):
+class Poses(PosesOrigin):
     """Current poses and lenses of a venue's cameras: all that is needed to draw on their pictures."""
 
     venue: Id = Field(description="Id of the venue.")
-    revision: int = Field(description="Revision in the history of the venue; the highest one is current.")
-    cause: Annotated[Cause, OPEN_WORD] = Field(description=f"Cause of the revision: {CAUSES}")
-    job: str | None = Field(
-        description="Job that found these poses; for a restored revision, the job whose poses were rejected by hand."
-    )
-    stitch_error_px: float | None = Field(description="Stitch error by the job; null: not measured.")
-    ridge: list[Row] | None = Field(description="Ridge that the poses belong to, as in the field; null: flat.")
     cameras: list[PosedCamera] = Field(description="Cameras with lenses and poses.")
     changed: list[Id] = Field(description="Cameras whose pose or lens differs from the previous revision.")
     picture_motions: dict[Id, PictureMotion] = Field(

@@ -4,8 +4,7 @@ import json
 import subprocess
 import sys
 
-from service.schemas.plan import PlanAnswer, PlannedSite
-from service.schemas.programs.planning import PlanRequest
+from service.schemas.plan import PlanAnswer, PlannedSite, PlanRequest
 
 SITE = {
     "field": {"template": "volleyball"},
