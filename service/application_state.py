@@ -24,8 +24,8 @@ class ApplicationState(Repositories):
         self.blobs = Blobs(settings.home_blob_url, BLOB_PATIENCE_S)
         self.disk = Disk(settings)
         self.snapshots = Snapshots(settings, self.source_timings.count)
-        self.intake = Intake(settings, self.submissions, self.expiry, self.blobs, self.queue.enqueue)
-        self.from_sources = FromSources(self.venues, self.submissions, self.snapshots, self.blobs, self.intake)
+        self.intake = Intake(settings, self, self.blobs, self.queue.enqueue)
+        self.from_sources = FromSources(self, self.snapshots, self.blobs, self.intake)
 
     def close(self) -> None:
         """Close the connections to the database."""

@@ -158,7 +158,7 @@ def _seen(home: ApplicationState, folders: int, seconds: float) -> Day:
         folders_per_s=folders / seconds if folders else None,
         jobs_ms=_ms(lambda: home.jobs.page(JobPage(PAGE)).jobs),
         venue_ms=_ms(lambda: home.jobs.page(JobPage(PAGE, venue="v7", status="succeeded")).jobs),
-        venues_ms=_ms(lambda: home.venue_summaries.of([f"v{number}" for number in range(50)])),
+        venues_ms=_ms(lambda: home.venues.calibration_summaries([f"v{number}" for number in range(50)])),
         resident_mb=resident_mb(os.getpid()),
         kept_kb_per_job=_database_kb(home) / kept,
         objects=len(files(home.settings.home_blob_url)),

@@ -11,27 +11,17 @@ from service.schemas.problems import Problem
 from service.schemas.venue import Venue
 from service.store.blobs import Blobs
 from service.store.ids import new_id
-from service.store.jobs.submission import Submission, SubmissionRepository, fetched_hash
+from service.store.jobs.submission import Submission, fetched_hash
 from service.store.jobs.task import Origin, seeded
-from service.store.venues import VenueRepository
+from service.store.repositories import Repositories
 
 
 class FromSources:
     """Fetches and submits."""
 
-    def __init__(
-        self,
-        venues: VenueRepository,
-        submissions: SubmissionRepository,
-        snapshots: Snapshots,
-        blobs: Blobs,
-        intake: Intake,
-    ) -> None:
-        self._venues = venues
-        self._submissions = submissions
-        self._snapshots = snapshots
-        self._blobs = blobs
-        self._intake = intake
+    def __init__(self, store: Repositories, snapshots: Snapshots, blobs: Blobs, intake: Intake) -> None:
+        self._venues, self._submissions = store.venues, store.submissions
+        self._snapshots, self._blobs, self._intake = snapshots, blobs, intake
 
     def calibrate(
         self,

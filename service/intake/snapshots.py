@@ -3,7 +3,7 @@
 import subprocess
 import tempfile
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from math import inf
 
 import structlog
@@ -12,7 +12,7 @@ from pydantic import ValidationError
 from service import child_process
 from service.intake import image_checks
 from service.schemas.problems import Problem
-from service.schemas.programs.sources import SourceAnswer, SourceFetch, SourceTask, frame_file, longest_s
+from service.schemas.programs.sources import SourceAnswer, SourceTask, frame_file, longest_s
 from service.schemas.source_urls import SourceSecrets
 from service.schemas.venue import Camera
 from service.settings import Settings
@@ -33,7 +33,7 @@ class SourceLate(Problem):
 class Snapshots:
     """Fetches frames of a venue's cameras at once; `count` is called with the duration of each fetch."""
 
-    def __init__(self, settings: Settings, count: Callable[[Sequence[SourceFetch]], None]) -> None:
+    def __init__(self, settings: Settings, count: Callable[[Collection[SourceAnswer]], None]) -> None:
         self._settings = settings
         self._count = count
         self._turns = threading.BoundedSemaphore(AT_ONCE)
@@ -69,23 +69,14 @@ class Snapshots:
                 task = self._task(cameras, credentials, folder, within_s).model_copy(
                     update={"frames": frames, "spacing_s": spacing_s}
                 )
-                answers = self._ask(task, credentials)
-                self._count_fetches(cameras, answers, task)
+                none = f"it gave no frame within {task.seconds:g} s"
+                silent = {one.id: SourceAnswer(camera=one.id, why=none, seconds=task.seconds) for one in cameras}
+                answers = silent | self._ask(task, credentials)
+                self._count(answers.values())
                 budget = image_checks.PixelBudget(self._settings)
-                return {camera.id: self._checked(camera, answers.get(camera.id), task, budget) for camera in cameras}
+                return {camera.id: self._checked(camera, answers[camera.id], task, budget) for camera in cameras}
         finally:
             self._turns.release()
-
-    def _count_fetches(self, cameras: Sequence[Camera], answers: Mapping[str, SourceAnswer], task: SourceTask) -> None:
-        given = [answers.get(camera.id) for camera in cameras]
-        self._count(
-            [
-                SourceFetch(answer.seconds, got_frame=answer.why is None)
-                if answer
-                else SourceFetch(task.seconds, got_frame=False)
-                for answer in given
-            ]
-        )
 
     def _task(
         self, cameras: Sequence[Camera], credentials: Mapping[str, str], folder: str, within_s: float | None
@@ -120,14 +111,13 @@ class Snapshots:
         }
 
     def _checked(
-        self, camera: Camera, answer: SourceAnswer | None, task: SourceTask, budget: image_checks.PixelBudget
+        self, camera: Camera, answer: SourceAnswer, task: SourceTask, budget: image_checks.PixelBudget
     ) -> list[bytes]:
-        if answer is None or answer.why is not None:
-            why = answer.why if answer else f"it gave no frame within {task.seconds:g} s"
-            problem = SourceLate if answer is None or answer.seconds >= LATE * task.seconds else Problem
+        if answer.why is not None:
+            problem = SourceLate if answer.seconds >= LATE * task.seconds else Problem
             raise problem(
                 "source-failed",
-                f"No frame of camera {camera.id} from {camera.source}: {why}.",
+                f"No frame of camera {camera.id} from {camera.source}: {answer.why}.",
                 camera=camera.id,
                 source=camera.source,
             )

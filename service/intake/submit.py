@@ -9,11 +9,11 @@ from service.schemas.problems import Problem
 from service.settings import Settings
 from service.store.blobs import Blobs
 from service.store.database import DATABASE_OUTAGES
-from service.store.expiry import ExpiryRepository
 from service.store.jobs.attempts import Enqueue
 from service.store.jobs.files import frame_folder, frame_path
-from service.store.jobs.submission import Submission, SubmissionRepository
+from service.store.jobs.submission import Submission
 from service.store.jobs.task import Origin
+from service.store.repositories import Repositories
 
 # Longer than any upload takes from its first stored frame to its job.
 UPLOAD_GRACE = timedelta(hours=1)
@@ -22,19 +22,10 @@ UPLOAD_GRACE = timedelta(hours=1)
 class Intake:
     """Makes jobs of submissions."""
 
-    def __init__(
-        self,
-        settings: Settings,
-        submissions: SubmissionRepository,
-        expiry: ExpiryRepository,
-        blobs: Blobs,
-        enqueue: Enqueue,
-    ) -> None:
+    def __init__(self, settings: Settings, store: Repositories, blobs: Blobs, enqueue: Enqueue) -> None:
         self._settings = settings
-        self._submissions = submissions
-        self._expiry = expiry
-        self._blobs = blobs
-        self._enqueue = enqueue
+        self._submissions, self._expiry = store.submissions, store.expiry
+        self._blobs, self._enqueue = blobs, enqueue
 
     def take(self, submission: Submission, store: Callable[[], None]) -> tuple[Job, bool]:
         """Store the files of a checked submission and make it a job, or find the job it already is; says if it is new.

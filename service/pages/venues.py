@@ -82,7 +82,7 @@ def venues(
 def venue_rows(context: Repositories, venues: list[Venue]) -> list[VenueRow]:
     """Return the rows of venues, with a fixed number of queries."""
     ids = [venue.id for venue in venues]
-    summaries, alarms = context.venue_summaries.of(ids), context.venue_summaries.alarms(ids)
+    summaries, alarms = context.venues.calibration_summaries(ids), context.venues.alarms(ids)
     active, decided = context.past_calibrations.active(ids), context.past_calibrations.decided(ids)
     jobs = context.jobs.several(active.values())
     return [

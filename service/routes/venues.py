@@ -407,7 +407,7 @@ def _lost_nights(revision: int, cameras: Sequence[str]) -> list[str]:
 def _summaries(context: Context, venues: Sequence[Venue]) -> list[VenueSummary]:
     """Return a summary of each venue: its alarms and its last calibration."""
     ids = [venue.id for venue in venues]
-    glances, alarms = context.venue_summaries.of(ids), context.venue_summaries.alarms(ids)
+    glances, alarms = context.venues.calibration_summaries(ids), context.venues.alarms(ids)
     return [
         VenueSummary(
             id=venue.id,

@@ -17,7 +17,6 @@ from service.store.schedules import ScheduleRepository
 from service.store.sessions import SessionRepository
 from service.store.statistics.past_calibrations import PastCalibrationRepository
 from service.store.statistics.source_timings import SourceTimingRepository
-from service.store.statistics.venue_summary import VenueSummaryRepository
 from service.store.trends import TrendRepository
 from service.store.venues import VenueRepository
 from service.store.workers import WorkerRepository
@@ -38,7 +37,6 @@ class Repositories:
         self.jobs = JobRepository(engine)
         self.attempts = AttemptRepository(engine)
         self.decisions = DecisionRepository(engine)
-        self.venue_summaries = VenueSummaryRepository(engine)
         self.past_calibrations = PastCalibrationRepository(engine)
         self.source_timings = SourceTimingRepository(engine)
         self.outbox = OutboxRepository(engine)

@@ -28,7 +28,7 @@ IN_SLOW_LANE = sa.or_(s.slow, s.failures > 0)
 class Firing:
     """The calibration of a venue that was due at a time."""
 
-    venue_id: str
+    venue: str
     due_at: datetime
     cron: str
     time_zone: str
@@ -75,7 +75,7 @@ class ScheduleRepository(Repository):
 
     def done(self, firing: Firing, now: datetime, job_id: str | None, error: str | None) -> None:
         """End a firing and wait for the next time. `error`: why there is no job."""
-        next_at = _next(firing.venue_id, firing, now)
+        next_at = _next(firing.venue, firing, now)
         brought = {} if job_id is None else {"last_job": job_id}
         self._write(firing, error, due_at=next_at, look_at=next_at, last_at=firing.due_at, **brought)
 
@@ -115,13 +115,7 @@ class ScheduleRepository(Repository):
 
     def _update(self, firing: Firing, **values: Any) -> int:
         # A venue that was put meanwhile with another schedule has other times.
-        same = (
-            s.venue == firing.venue_id,
-            s.due_at == firing.due_at,
-            s.cron == firing.cron,
-            s.time_zone == firing.time_zone,
-            s.exact == firing.exact,
-        )
+        same = [s[name] == getattr(firing, name) for name in ("venue", "due_at", *FIRES_BY)]
         with writing(self._engine) as connection:
             return connection.execute(sa.update(tables.schedules).where(*same).values(**values)).rowcount
 

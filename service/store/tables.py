@@ -17,6 +17,17 @@ class Instant(sa.TypeDecorator[datetime]):
         return None if value is None else value.replace(tzinfo=UTC) if value.tzinfo is None else value.astimezone(UTC)
 
 
+def _actor_columns() -> list[sa.Column[Any]]:
+    """Return the columns of the actor of a change, see actors.py; null: the service by itself."""
+    return [
+        sa.Column(name, sa.String(length)) for name, length in (("asked_by", 80), ("address", 64), ("request_id", 64))
+    ]
+
+
+def _partial_index(name: str, column: str, where: sa.TextClause, *, unique: bool = False) -> sa.Index:
+    return sa.Index(name, column, unique=unique, sqlite_where=where, postgresql_where=where)
+
+
 metadata = sa.MetaData()
 
 venues = sa.Table(
@@ -50,10 +61,7 @@ revisions = sa.Table(
     sa.Column("field_numbers", sa.JSON(none_as_null=True)),
     # schemas.geometry.Movement by camera.
     sa.Column("movements", sa.JSON, nullable=False),
-    # The actor, see actors.py; null: the service by itself.
-    sa.Column("asked_by", sa.String(80)),
-    sa.Column("address", sa.String(64)),
-    sa.Column("request_id", sa.String(64)),
+    *_actor_columns(),
     sa.Index("revisions_by_venue", "venue", "number", unique=True),
     sa.Index("revisions_by_job", "job"),
     sa.Index("revisions_by_time", "cause", "at"),
@@ -112,12 +120,8 @@ jobs = sa.Table(
     # From then on the row answers for none of its files, whether or not the store is rid of them.
     sa.Column("frames_deleted_at", Instant),
     sa.Column("pictures_deleted_at", Instant),
-    # schemas.job.Job's.
-    sa.Column("asked_by", sa.String(80)),
-    # The client's; null: there was none.
-    sa.Column("address", sa.String(64)),
-    # The request that it came with, as its log and its trace call it.
-    sa.Column("request_id", sa.String(64)),
+    *_actor_columns(),
+    # The place of its request in a trace.
     sa.Column("traceparent", sa.String(55)),
     # The lists, newest first, by whatever they are filtered; of one venue, filtered within the index.
     sa.Index("jobs_by_venue", "venue", "id", "status", "kind"),
@@ -127,20 +131,10 @@ jobs = sa.Table(
     # The queue.
     sa.Index("jobs_by_status", "status", "priority", "id"),
     sa.Index("one_job_per_key", "venue", "idempotency_key", unique=True),
-    sa.Index("one_active_job_per_venue", "venue", unique=True, sqlite_where=ACTIVE, postgresql_where=ACTIVE),
+    _partial_index("one_active_job_per_venue", "venue", ACTIVE, unique=True),
     sa.Index("jobs_by_end", "finished_at"),
-    sa.Index(
-        "jobs_with_frames",
-        "finished_at",
-        sqlite_where=sa.text("frames_deleted_at IS NULL"),
-        postgresql_where=sa.text("frames_deleted_at IS NULL"),
-    ),
-    sa.Index(
-        "jobs_with_pictures",
-        "finished_at",
-        sqlite_where=sa.text("pictures_deleted_at IS NULL"),
-        postgresql_where=sa.text("pictures_deleted_at IS NULL"),
-    ),
+    _partial_index("jobs_with_frames", "finished_at", sa.text("frames_deleted_at IS NULL")),
+    _partial_index("jobs_with_pictures", "finished_at", sa.text("pictures_deleted_at IS NULL")),
 )
 
 # For queries about the jobs of one venue: SQLite, which has no statistics, would as soon go through all of a kind.
@@ -168,10 +162,7 @@ events = sa.Table(
     # Its data; of a job that ended, which is read when it is told, null.
     sa.Column("data", sa.JSON(none_as_null=True)),
     sa.Column("job", sa.String(26)),
-    # The actor, see actors.py; null: the service by itself.
-    sa.Column("asked_by", sa.String(80)),
-    sa.Column("address", sa.String(64)),
-    sa.Column("request_id", sa.String(64)),
+    *_actor_columns(),
     sa.Index("events_by_venue", "venue", "id"),
     sqlite_autoincrement=True,
 )
@@ -224,7 +215,7 @@ venue_quality = sa.Table(
     sa.Column("rejected_in_a_row", sa.Integer, nullable=False, server_default="0"),
     # statistics.venue_quality.CameraHistory by camera.
     sa.Column("cameras", sa.JSON(none_as_null=True)),
-    # statistics.venue_summary.CalibrationSummary; null: it was never calibrated.
+    # statistics.venue_quality.CalibrationSummary; null: it was never calibrated.
     sa.Column("glance", sa.JSON(none_as_null=True)),
     # The next time at which an alarm begins unless something happens before.
     sa.Column("alarm_due_at", Instant),

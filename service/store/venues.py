@@ -13,8 +13,8 @@ import sqlalchemy as sa
 from service.schemas.actor import Actor
 from service.schemas.base import Unreadable
 from service.schemas.field import FieldOfPlay
-from service.schemas.health import CameraHealth, VenueHealth
-from service.schemas.history import Cause, Revision, RevisionCamera
+from service.schemas.health import Alarm, CameraHealth, VenueHealth
+from service.schemas.history import Cause, Revision
 from service.schemas.names import OPEN_STATUSES
 from service.schemas.source_urls import SourceSecrets
 from service.schemas.venue import Venue
@@ -37,7 +37,7 @@ from service.store.revisions import (
     state_at,
 )
 from service.store.schedules import plan_schedule, schedule_of
-from service.store.statistics.venue_quality import CameraHistory, QualityRow, read_quality
+from service.store.statistics.venue_quality import CalibrationSummary, QualityRow, read_quality, summary_in
 from service.store.unreadable import UnreadableRow, read_each
 from service.store.venue_fold import with_revision_restored, with_venue_put
 from service.store.venue_state import StoredVenue, active_alarms, load, read_venue, write_changes
@@ -111,6 +111,19 @@ class VenueRepository(Repository):
             rows = connection.execute(query).all()
         venues, unreadable = read_each(rows[:limit], lambda row: read_venue(row.id, row.document).venue)
         return VenuePage(venues, unreadable, rows[limit - 1].id if len(rows) > limit else None)
+
+    def calibration_summaries(self, venues: Collection[str]) -> dict[str, CalibrationSummary]:
+        """Return the summaries of venues that were ever calibrated, by venue."""
+        q = tables.venue_quality.c
+        query = sa.select(q.venue, q.glance).where(q.venue.in_(venues), q.glance.is_not(None))
+        with reading(self._engine) as connection:
+            found = {row.venue: summary_in(row) for row in connection.execute(query)}
+        return {venue: summary for venue, summary in found.items() if summary is not None}
+
+    def alarms(self, venues: Collection[str]) -> dict[str, list[Alarm]]:
+        """Return the active alarms of venues, the oldest first, by venue."""
+        with reading(self._engine) as connection:
+            return active_alarms(connection, venues)
 
     def put(
         self,
@@ -197,7 +210,26 @@ class VenueRepository(Repository):
     def health(self, venue_id: str) -> VenueHealth | None:
         """Return the health of a venue, None if there is none."""
         with reading(self._engine) as connection:
-            return _health_of(connection, venue_id)
+            newest = newest_revision(connection, venue_id)
+            if newest is None:
+                return None
+            quality = read_quality(connection, venue_id) or QualityRow()
+            alarms = active_alarms(connection, [venue_id]).get(venue_id, [])
+            schedule = schedule_of(connection, venue_id)
+        histories = [(camera, quality.history(camera.id)) for camera in newest.cameras]
+        return VenueHealth(
+            state="alarm" if alarms else "ok",
+            alarms=alarms,
+            revision=newest.revision,
+            cameras=[
+                CameraHealth(**dict(camera), accepted_at=one.accepted_at, rejected_in_a_row=one.rejected_in_a_row)
+                for camera, one in histories
+            ],
+            stitch_error_px=quality.stitch_error_px,
+            accepted_at=quality.accepted_at,
+            rejected_in_a_row=quality.rejected_in_a_row,
+            schedule=schedule,
+        )
 
     def delete(self, venue_id: str, precondition: Precondition = UNCONDITIONAL, by: Actor | None = None) -> None:
         """Delete a venue, readable or not, with its history; raises the problem `venue-busy` if a job of it is open."""
@@ -264,28 +296,6 @@ class VenueRepository(Repository):
         with reading(self._engine) as connection:
             newest = newest_revision(connection, venue_id)
             return None if newest is None else (newest, origin_of(connection, venue_id, newest))
-
-
-def _health_of(connection: sa.Connection, venue_id: str) -> VenueHealth | None:
-    newest = newest_revision(connection, venue_id)
-    if newest is None:
-        return None
-    quality = read_quality(connection, venue_id) or QualityRow()
-    alarms = active_alarms(connection, [venue_id]).get(venue_id, [])
-    return VenueHealth(
-        state="alarm" if alarms else "ok",
-        alarms=alarms,
-        revision=newest.revision,
-        cameras=[_camera_health(camera, quality.history(camera.id)) for camera in newest.cameras],
-        stitch_error_px=quality.stitch_error_px,
-        accepted_at=quality.accepted_at,
-        rejected_in_a_row=quality.rejected_in_a_row,
-        schedule=schedule_of(connection, venue_id),
-    )
-
-
-def _camera_health(camera: RevisionCamera, history: CameraHistory) -> CameraHealth:
-    return CameraHealth(**dict(camera), accepted_at=history.accepted_at, rejected_in_a_row=history.rejected_in_a_row)
 
 
 def find_stored(connection: sa.Connection, venue_id: str) -> StoredVenue | None:

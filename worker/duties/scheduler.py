@@ -95,15 +95,15 @@ class Scheduler:
                 continue
             firings = self._schedules.claim_due(due.now, due.now + ATTEMPT, limit, slow=slow)
             for firing in firings:
-                lane.begin(partial(self._fire, firing, slow=slow), firing.venue_id)
+                lane.begin(partial(self._fire, firing, slow=slow), firing.venue)
             room -= len(firings)
             fired += 0 if slow else len(firings)
         return fired
 
     def _fire(self, firing: Firing, *, slow: bool) -> None:
-        with structlog.contextvars.bound_contextvars(venue=firing.venue_id):
+        with structlog.contextvars.bound_contextvars(venue=firing.venue):
             try:
-                venue = self._home.venues.get(firing.venue_id)
+                venue = self._home.venues.get(firing.venue)
                 if venue is None or venue.schedule is None:
                     return
                 job = self._job(firing, venue, venue.schedule, slow=slow)

@@ -3,7 +3,6 @@
 Imports little: each fetch starts a process that loads this module.
 """
 
-from dataclasses import dataclass
 from pathlib import Path
 
 from pydantic import BaseModel, Field
@@ -40,11 +39,3 @@ def frame_file(task: SourceTask, camera: str, number: int) -> Path:
 def longest_s(task: SourceTask) -> float:
     """Return the time after which the program gives up, seconds."""
     return task.seconds + (task.frames - 1) * task.spacing_s
-
-
-@dataclass(frozen=True)
-class SourceFetch:
-    """Fetch of one source: its duration, and whether it gave a frame."""
-
-    seconds: float
-    got_frame: bool

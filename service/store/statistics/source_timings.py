@@ -1,10 +1,10 @@
 """Histogram of the times that sources of cameras take to give a frame."""
 
-from collections.abc import Sequence
+from collections.abc import Collection
 
 import structlog
 
-from service.schemas.programs.sources import SourceFetch
+from service.schemas.programs.sources import SourceAnswer
 from service.store.database import DATABASE_OUTAGES, Repository, writing
 from service.store.statistics import counters
 from service.store.statistics.counters import HistogramBuckets
@@ -18,9 +18,9 @@ log = structlog.get_logger()
 class SourceTimingRepository(Repository):
     """The fetches that the database has counted."""
 
-    def count(self, fetches: Sequence[SourceFetch]) -> None:
-        """Count some, each a source of its own."""
-        amounts = counters.total(FETCH.of(fetch.seconds, FRAME if fetch.got_frame else NONE) for fetch in fetches)
+    def count(self, fetches: Collection[SourceAnswer]) -> None:
+        """Count some, each of a source of its own."""
+        amounts = counters.total(FETCH.of(fetch.seconds, FRAME if fetch.why is None else NONE) for fetch in fetches)
         try:
             with writing(self._engine) as connection:
                 counters.add(connection, amounts)

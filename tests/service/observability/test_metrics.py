@@ -9,7 +9,7 @@ import sqlalchemy as sa
 from service.observability.disk import Disk
 from service.observability.metrics import Metrics
 from service.schemas.job import JobError
-from service.schemas.programs.sources import SourceFetch
+from service.schemas.programs.sources import SourceAnswer
 from service.schemas.results import View
 from service.schemas.schedule import Schedule
 from service.store import tables
@@ -171,7 +171,7 @@ def test_how_late_schedules_are_and_how_long_sources_took_is_told(stock):
             late = {"due_at": now - timedelta(minutes=minutes), "failures": failures}
             connection.execute(sa.update(tables.schedules).where(s.venue == name).values(late))
     stock.source_timings.count(
-        [SourceFetch(0.2, got_frame=True), SourceFetch(0.4, got_frame=True), SourceFetch(15.0, got_frame=False)]
+        [SourceAnswer(camera="c", seconds=seconds, why=why) for seconds, why in ((0.2, None), (0.4, None), (15.0, "x"))]
     )
     found = figures(stock)
     late = "esc_schedule_late_seconds"

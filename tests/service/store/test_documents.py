@@ -42,7 +42,7 @@ def test_an_alarm_by_a_rule_of_a_newer_version_rings_on(stock):
         connection.execute(sa.insert(tables.alarms).values(row))
     stock.moved_by_hand("main", 3.0)
     assert [alarm.rule for alarm in stock.venues.health("main").alarms] == ["crowd-too-loud"]
-    assert stock.venue_summaries.alarms(["main"])["main"][0].rule == "crowd-too-loud"
+    assert stock.venues.alarms(["main"])["main"][0].rule == "crowd-too-loud"
 
 
 def test_what_clients_send_is_read_strictly_and_what_is_stored_is_not():

@@ -11,7 +11,7 @@ from testbed.homes import in_both_homes
 
 
 def glance(stock, venue="v"):
-    return stock.venue_summaries.of([venue]).get(venue)
+    return stock.venues.calibration_summaries([venue]).get(venue)
 
 
 def test_a_venue_shows_how_its_last_calibration_ended_and_the_errors_of_its_results(stock):

@@ -104,7 +104,7 @@ def test_a_time_that_came_fires_once(stock, schedules):
     due = put(stock).next_at
     assert schedules.claim_due(due - timedelta(seconds=1), due, 10) == []
     (firing,) = schedules.claim_due(due, due + LEASE, 10)
-    assert (firing.venue_id, firing.due_at) == ("v", due)
+    assert (firing.venue, firing.due_at) == ("v", due)
     # Another worker.
     assert schedules.claim_due(due, due + LEASE, 10) == []
     schedules.done(firing, due, None, "the camera is away")

@@ -252,7 +252,7 @@ def test_those_that_were_put_off_go_before_those_that_came_after(app):
     # It was put off until now, and the other one becomes due.
     set_times(app, "late", due_at=now, look_at=now - timedelta(seconds=1))
     set_times(app, "early", due_at=now - timedelta(minutes=15), look_at=now)
-    assert [firing.venue_id for firing in app.schedules.claim_due(now, now + timedelta(minutes=1), 1)] == ["early"]
+    assert [firing.venue for firing in app.schedules.claim_due(now, now + timedelta(minutes=1), 1)] == ["early"]
 
 
 def test_a_camera_that_is_slow_holds_up_no_other_venue(app, duty, monkeypatch):
