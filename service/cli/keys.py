@@ -15,8 +15,9 @@ from service.cli.local_database import report_database_errors, require_folders
 from service.cli.printing import FAILED, USAGE, fail, print_note, print_rows
 from service.cli.service_settings import load_settings
 from service.schemas.names import ID_IN_WORDS, ID_PATTERN, Scope
+from service.schemas.problems import Problem
 from service.store.database import connect, migrate, sqlite_file
-from service.store.keys import KEY_CACHED_FOR_S, KeyExists, KeyRepository, old_name
+from service.store.keys import KEY_CACHED_FOR_S, KeyRepository, old_name
 
 OTHER_FOLDER_HINT = "Of a service that has its folder elsewhere, name it: --data, or ESC_DATA."
 UNITS = {"m": timedelta(minutes=1), "h": timedelta(hours=1), "d": timedelta(days=1)}
@@ -47,7 +48,7 @@ def add_key(
     with _keys(data) as keys:
         try:
             key = keys.add(name, scope, datetime.now(UTC) + timedelta(days) if days else None, venues or None)
-        except KeyExists:
+        except Problem:
             fail(f"There is a key {name} already: remove it first, or take another name.", USAGE)
         is_first = len(keys.all()) == 1
     _print_key(key)

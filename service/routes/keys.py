@@ -13,7 +13,7 @@ from service.routes.contract.problem_docs import problem_responses
 from service.schemas.keys import ApiKey, ApiKeys, KeyIn, MadeKey
 from service.schemas.names import ID_PATTERN
 from service.schemas.problems import Problem
-from service.store.keys import Key, KeyExists
+from service.store.keys import Key
 
 log = structlog.get_logger()
 router = APIRouter(prefix="/keys", tags=["keys"], route_class=Guarded)
@@ -39,10 +39,7 @@ def list_keys(by: Administrator, context: InContext) -> ApiKeys:  # noqa: ARG001
 @router.post("", openapi_extra=needs_scope("admin"), status_code=201, responses=problem_responses("key-exists"))
 def add_key(wanted: KeyIn, by: Administrator, context: InContext) -> MadeKey:
     """Make a key and return it, this once: what is stored is its hash."""
-    try:
-        key = context.keys.add(wanted.name, wanted.scope, wanted.expires_at, wanted.venue_ids)
-    except KeyExists:
-        raise Problem("key-exists", f"Revoke {wanted.name} first, or take another name.") from None
+    key = context.keys.add(wanted.name, wanted.scope, wanted.expires_at, wanted.venue_ids)
     log.info("key made", name=wanted.name, scope=wanted.scope, venues=wanted.venue_ids, by=by.name)
     return MadeKey(name=wanted.name, key=key)
 

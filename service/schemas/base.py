@@ -129,6 +129,11 @@ class Schema(BaseModel):
         return made
 
 
+def with_example(**members: Any) -> ConfigDict:
+    """Return the configuration of a model whose JSON schema has an example with these members."""
+    return ConfigDict(json_schema_extra={"examples": [members]})
+
+
 class Unreadable(Schema):
     """A stored entry that this version cannot read, and the reason."""
 

@@ -2,9 +2,9 @@
 
 from typing import Annotated, Literal
 
-from pydantic import ConfigDict, Field
+from pydantic import Field
 
-from service.schemas.base import OPEN_WORD, Id, Schema
+from service.schemas.base import OPEN_WORD, Id, Schema, with_example
 from service.schemas.field import FieldOfPlay
 from service.schemas.geometry import Intrinsics, Pose
 from service.schemas.names import FormatName
@@ -18,7 +18,7 @@ GRADES: tuple[Grade, ...] = ("wrong", "drifted", "cannot-tell", "good")
 class CheckOptions(Handling):
     """Options of a check: the field that the cameras look at, which the files of most tools do not have."""
 
-    model_config = ConfigDict(json_schema_extra={"examples": [{"field": {"template": "tennis"}}]})
+    model_config = with_example(field={"template": "tennis"})
 
     field: FieldOfPlay
     seed: Seed | None = Field(None, description="Absent: one is chosen.")

@@ -4,9 +4,9 @@ from bisect import bisect
 from itertools import pairwise
 from typing import Annotated, Any, Self
 
-from pydantic import ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
-from service.schemas.base import Number, Schema
+from service.schemas.base import Number, Schema, with_example
 from service.schemas.geometry import UnposedCamera
 
 # FreeD has 24 bits for a count.
@@ -81,7 +81,7 @@ class FocusEncoder(_Encoder):
 class LensEncoders(Schema):
     """Tables of a lens, as the renderer's lens file has them, by which FreeD packets say its zoom and focus."""
 
-    model_config = ConfigDict(json_schema_extra={"examples": [ENCODERS_EXAMPLE]})
+    model_config = with_example(**ENCODERS_EXAMPLE)
 
     zoom: ZoomEncoder | None = Field(None, description="Zoom; null: its count is 0.")
     focus: FocusEncoder | None = Field(None, description="Focus; null: its count is 0.")

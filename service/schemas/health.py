@@ -3,11 +3,11 @@
 from datetime import datetime
 from typing import Annotated, Any, Literal
 
-from pydantic import ConfigDict, Field
+from pydantic import Field
 
 from service.schemas.actor import Attributed
 from service.schemas.addresses import CallbackUrl
-from service.schemas.base import OPEN_WORD, Flag, Id, Integer, Number, Schema
+from service.schemas.base import OPEN_WORD, Flag, Id, Integer, Number, Schema, with_example
 from service.schemas.history import RevisionCamera
 from service.schemas.names import JobStatus, Verdict
 from service.schemas.schedule import ScheduleState
@@ -23,7 +23,7 @@ ALARMS_EXAMPLE: dict[str, Any] = {
 class Alarms(Schema):
     """Alarm rules of a venue; each is optional."""
 
-    model_config = ConfigDict(json_schema_extra={"examples": [ALARMS_EXAMPLE]})
+    model_config = with_example(**ALARMS_EXAMPLE)
 
     moved_since_last_px: Annotated[Number, Field(gt=0)] | None = Field(
         None, description="A calibration moves the pitch in a camera's picture by more than this."

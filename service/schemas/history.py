@@ -3,10 +3,10 @@
 from datetime import datetime
 from typing import Annotated, Literal
 
-from pydantic import ConfigDict, Field, StringConstraints
+from pydantic import Field, StringConstraints
 
 from service.schemas.actor import BY, Actor
-from service.schemas.base import OPEN_WORD, UNREADABLE, Id, Integer, Schema, Unreadable, is_empty
+from service.schemas.base import OPEN_WORD, UNREADABLE, Id, Integer, Schema, Unreadable, is_empty, with_example
 from service.schemas.geometry import Movement, Pose, Row
 from service.schemas.names import JOB_ID_PATTERN, FieldNumber
 
@@ -48,34 +48,28 @@ class PosesOrigin(Schema):
 class Revision(PosesOrigin):
     """Poses of a venue from a moment on, with the lenses and the ridge that they belong to."""
 
-    model_config = ConfigDict(
-        json_schema_extra={
-            "examples": [
-                {
-                    "revision": 2,
-                    "at": "2026-11-21T10:00:09Z",
-                    "cause": "calibrated",
-                    "job": "01KAJ3Q6WZ5T3Y8R0N4M2C7B1D",
-                    "restored_from": None,
-                    "stitch_error_px": 0.2,
-                    "ridge": [[-18.5, 0.0, 0.2367], [18.5, 0.0, 0.2367]],
-                    "cameras": [
-                        {
-                            "id": "left",
-                            "pose": {
-                                "rotation": [1.675, 0.372, -0.462],
-                                "position": [-1.48, -49.49, 7.84],
-                                "translation": [-20.06, 3.73, 45.85],
-                            },
-                            "moved": {"rotation_deg": 0.1, "position_m": 0.02, "pixels": 4.1},
-                            "drift": {"rotation_deg": 0.1, "position_m": 0.02, "pixels": 4.1},
-                            "drift_since": 1,
-                        }
-                    ],
-                    "by": {"name": "key truck-7", "address": "10.1.0.7", "request_id": "van-3"},
-                }
-            ]
-        }
+    model_config = with_example(
+        revision=2,
+        at="2026-11-21T10:00:09Z",
+        cause="calibrated",
+        job="01KAJ3Q6WZ5T3Y8R0N4M2C7B1D",
+        restored_from=None,
+        stitch_error_px=0.2,
+        ridge=[[-18.5, 0.0, 0.2367], [18.5, 0.0, 0.2367]],
+        cameras=[
+            {
+                "id": "left",
+                "pose": {
+                    "rotation": [1.675, 0.372, -0.462],
+                    "position": [-1.48, -49.49, 7.84],
+                    "translation": [-20.06, 3.73, 45.85],
+                },
+                "moved": {"rotation_deg": 0.1, "position_m": 0.02, "pixels": 4.1},
+                "drift": {"rotation_deg": 0.1, "position_m": 0.02, "pixels": 4.1},
+                "drift_since": 1,
+            }
+        ],
+        by={"name": "key truck-7", "address": "10.1.0.7", "request_id": "van-3"},
     )
 
     at: datetime = Field(description="Time since which it is in use.")
@@ -98,7 +92,7 @@ class History(Schema):
 class Restore(Schema):
     """Request to restore the poses of a revision."""
 
-    model_config = ConfigDict(json_schema_extra={"examples": [{"revision": 1}]})
+    model_config = with_example(revision=1)
 
     revision: Annotated[Integer, Field(ge=1, le=2**31 - 1)] = Field(description="Number of the revision.")
 
@@ -106,9 +100,7 @@ class Restore(Schema):
 class AdoptField(Schema):
     """Request to store a dimension of the field as a job measured it, see `adoptable` of its result."""
 
-    model_config = ConfigDict(
-        json_schema_extra={"examples": [{"job": "01KAJ3Q6WZ5T3Y8R0N4M2C7B1D", "name": "ridge_height_m"}]}
-    )
+    model_config = with_example(job="01KAJ3Q6WZ5T3Y8R0N4M2C7B1D", name="ridge_height_m")
 
     job: Annotated[str, StringConstraints(pattern=JOB_ID_PATTERN)] = Field(
         description="Id of the calibration that offers it."
@@ -119,9 +111,7 @@ class AdoptField(Schema):
 class AdoptFound(Schema):
     """Request to store cameras that a search found."""
 
-    model_config = ConfigDict(
-        json_schema_extra={"examples": [{"job": "01KAJ3Q6WZ5T3Y8R0N4M2C7B1D", "candidates": {"right": 2}}]}
-    )
+    model_config = with_example(job="01KAJ3Q6WZ5T3Y8R0N4M2C7B1D", candidates={"right": 2})
 
     job: Annotated[str, StringConstraints(pattern=JOB_ID_PATTERN)] = Field(description="Id of the search.")
     candidates: dict[Id, Annotated[Integer, Field(ge=1, le=100)] | None] = Field(

@@ -4,10 +4,10 @@ from collections.abc import Iterable
 from datetime import datetime
 from typing import Annotated, Any, Literal, Self, get_args
 
-from pydantic import ConfigDict, Field, ValidationInfo, ValidatorFunctionWrapHandler, WrapValidator
+from pydantic import Field, ValidationInfo, ValidatorFunctionWrapHandler, WrapValidator
 
 from service.schemas.actor import Attributed
-from service.schemas.base import OPEN_WORD, UNREADABLE, Schema, Unreadable, is_empty, is_none, is_tolerant
+from service.schemas.base import OPEN_WORD, UNREADABLE, Schema, Unreadable, is_empty, is_none, is_tolerant, with_example
 from service.schemas.names import OPEN_STATUSES, JobKind, JobStatus, problem_uri
 from service.schemas.problems import PROBLEM_TYPES
 from service.schemas.results import AnyResult
@@ -91,31 +91,25 @@ class JobBase(Schema):
 class Job(JobBase):
     """A computation of a worker: its state, its progress, and in the end its result or its error."""
 
-    model_config = ConfigDict(
-        json_schema_extra={
-            "examples": [
-                {
-                    "id": "01KAJ3Q6WZ5T3Y8R0N4M2C7B1D",
-                    "kind": "calibration",
-                    "venue": "tsukuba",
-                    "status": "running",
-                    "progress": {"stage": "evolution", "fraction": 0.42, "generation": 37, "loss": 0.31},
-                    "queue_position": None,
-                    "attempt": 1,
-                    "created_at": "2026-11-21T10:00:00Z",
-                    "started_at": "2026-11-21T10:00:01Z",
-                    "finished_at": None,
-                    "error": None,
-                    "result": None,
-                    "callback": None,
-                    "venue_revision": None,
-                    "asked_by": "key truck-7",
-                    "options": {"preset": "esc", "seed": 7},
-                    "frames": {"left": ["/jobs/01KAJ3Q6WZ5T3Y8R0N4M2C7B1D/frames/0"]},
-                    "links": {"self": "/jobs/01KAJ3Q6WZ5T3Y8R0N4M2C7B1D"},
-                }
-            ]
-        }
+    model_config = with_example(
+        id="01KAJ3Q6WZ5T3Y8R0N4M2C7B1D",
+        kind="calibration",
+        venue="tsukuba",
+        status="running",
+        progress={"stage": "evolution", "fraction": 0.42, "generation": 37, "loss": 0.31},
+        queue_position=None,
+        attempt=1,
+        created_at="2026-11-21T10:00:00Z",
+        started_at="2026-11-21T10:00:01Z",
+        finished_at=None,
+        error=None,
+        result=None,
+        callback=None,
+        venue_revision=None,
+        asked_by="key truck-7",
+        options={"preset": "esc", "seed": 7},
+        frames={"left": ["/jobs/01KAJ3Q6WZ5T3Y8R0N4M2C7B1D/frames/0"]},
+        links={"self": "/jobs/01KAJ3Q6WZ5T3Y8R0N4M2C7B1D"},
     )
 
     queue_position: int | None = Field(description="Position in the queue, 1 = next; null unless queued.")

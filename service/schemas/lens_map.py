@@ -118,10 +118,11 @@ def require_usable_lens(lens: Any, image_size: Sequence[int]) -> None:
 
 
 def times_larger(matrix: Sequence[Sequence[float]], image_size: Sequence[int]) -> float | None:
-    """Return the ratio of the picture to the resolution that a camera matrix belongs to; None if it is this one."""
-    (_, _, cx), (_, _, cy), _ = matrix
-    width, height = image_size
-    return _times_larger(cx / width, cy / height)
+    """Return the ratio of the picture to the resolution whose middle the principal point is; None if it is this one."""
+    across, down = (row[2] / side for row, side in zip(matrix, image_size, strict=False))
+    off = {times: max(abs(across * times - 0.5), abs(down * times - 0.5)) for times in (1, *OTHER_SIZES)}
+    nearest = min(off, key=lambda times: off[times])
+    return nearest if nearest != 1 and off[nearest] < CENTRED else None
 
 
 def map_of(
@@ -187,7 +188,7 @@ def _map_doubts(seen: LensMap) -> Iterator[str]:
 
 def _matrix_doubts(matrix: Sequence[Sequence[float]], width: int, height: int) -> Iterator[str]:
     (fx, skew, cx), (_, fy, cy), _ = matrix
-    larger = _times_larger(cx / width, cy / height)
+    larger = times_larger(matrix, (width, height))
     if larger is not None:
         # Pixel centres are at integers before and after.
         x, y = (larger * (centre + 0.5) - 0.5 for centre in (cx, cy))
@@ -203,16 +204,6 @@ def _matrix_doubts(matrix: Sequence[Sequence[float]], width: int, height: int) -
             "square: it was fitted to too few photos, or the picture was stretched; calibrate it anew with a board in "
             "every corner of the picture (`esc intrinsics`)"
         )
-
-
-def _times_larger(across: float, down: float) -> float | None:
-    """Return the ratio of the picture to the resolution whose middle the principal point is; None if it is this one.
-
-    `across` and `down`: the principal point in parts of the sides.
-    """
-    off = {times: max(abs(across * times - 0.5), abs(down * times - 0.5)) for times in (1, *OTHER_SIZES)}
-    nearest = min(off, key=lambda times: off[times])
-    return nearest if nearest != 1 and off[nearest] < CENTRED else None
 
 
 @lru_cache(maxsize=256)

@@ -3,9 +3,9 @@
 from datetime import datetime
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, ConfigDict, Field, StringConstraints, model_validator
+from pydantic import AfterValidator, Field, StringConstraints, model_validator
 
-from service.schemas.base import OPEN_WORD, Flag, Id, Integer, Name, Number, Schema, Timestamp
+from service.schemas.base import OPEN_WORD, Flag, Id, Integer, Name, Number, Schema, Timestamp, with_example
 from service.schemas.geometry import Pose, PoseIn
 from service.schemas.source_urls import hide_secrets
 
@@ -114,7 +114,7 @@ CAMERA_EXAMPLE: dict[str, Any] = {
 class LiveReport(Schema):
     """Report of a process that sends live poses, twice a second."""
 
-    model_config = ConfigDict(json_schema_extra={"examples": [PROCESS_EXAMPLE | {"cameras": [CAMERA_EXAMPLE]}]})
+    model_config = with_example(**PROCESS_EXAMPLE, cameras=[CAMERA_EXAMPLE])
 
     started_at: Timestamp = Field(description="Time at which the process started.")
     host: Annotated[Name, StringConstraints(min_length=1, max_length=255)] = Field(

@@ -2,10 +2,10 @@
 
 from typing import Annotated, Literal, Self
 
-from pydantic import ConfigDict, Field, RootModel, StringConstraints, model_validator
+from pydantic import Field, RootModel, StringConstraints, model_validator
 
 from service.schemas.addresses import CallbackUrl
-from service.schemas.base import OPEN_WORD, Flag, Id, Integer, Number, Schema
+from service.schemas.base import OPEN_WORD, Flag, Id, Integer, Number, Schema, with_example
 from service.schemas.geometry import Metres
 from service.schemas.names import BoardLensModel
 
@@ -31,7 +31,7 @@ class Handling(Schema):
 class Options(Handling):
     """Options of a calibration; everything is optional."""
 
-    model_config = ConfigDict(json_schema_extra={"examples": [{"preset": "esc", "seed": 7, "dry_run": True}]})
+    model_config = with_example(preset="esc", seed=7, dry_run=True)
 
     preset: Annotated[Literal["esc", "paper", "scpr"], OPEN_WORD] = Field(
         "esc", description="Method: `esc`, or one of the published ones that it is compared with, `paper` and `scpr`."
@@ -98,7 +98,7 @@ class Board(Schema):
 class IntrinsicsOptions(Handling):
     """Options of a lens calibration from photos: the board, and the lens model."""
 
-    model_config = ConfigDict(json_schema_extra={"examples": [{"board": {"columns": 9, "rows": 6, "square_m": 0.03}}]})
+    model_config = with_example(board={"columns": 9, "rows": 6, "square_m": 0.03})
 
     board: Board
     model: Annotated[BoardLensModel, OPEN_WORD] = Field(
@@ -126,19 +126,13 @@ class ClickedPoints(RootModel[dict[Id, Annotated[list[ClickedPoint], Field(min_l
 class LocateOptions(Handling):
     """Options of a first pose: points of the pitch that were clicked in the picture of a camera."""
 
-    model_config = ConfigDict(
-        json_schema_extra={
-            "examples": [
-                {
-                    "points": [
-                        {"world": "left near corner", "pixel": [128.3, 1141.1]},
-                        {"world": "left penalty area, near corner", "pixel": [939.6, 1053.9]},
-                        {"world": "left penalty area, far corner", "pixel": [1771.6, 813.2]},
-                        {"world": [0.0, 0.0], "pixel": [2796.7, 876.0]},
-                    ]
-                }
-            ]
-        }
+    model_config = with_example(
+        points=[
+            {"world": "left near corner", "pixel": [128.3, 1141.1]},
+            {"world": "left penalty area, near corner", "pixel": [939.6, 1053.9]},
+            {"world": "left penalty area, far corner", "pixel": [1771.6, 813.2]},
+            {"world": [0.0, 0.0], "pixel": [2796.7, 876.0]},
+        ]
     )
 
     points: Annotated[list[ClickedPoint], Field(min_length=4, max_length=500)] = Field(description="Clicked points.")
@@ -147,7 +141,7 @@ class LocateOptions(Handling):
 class FieldOptions(Handling):
     """Options of a fit of the pitch's dimensions; everything is optional."""
 
-    model_config = ConfigDict(json_schema_extra={"examples": [{"seed": 7}]})
+    model_config = with_example(seed=7)
 
     seed: Seed | None = Field(None, description="Absent: one is chosen.")
 
@@ -159,7 +153,7 @@ class FindOptions(Handling):
     each camera.
     """
 
-    model_config = ConfigDict(json_schema_extra={"examples": [{"cameras": ["left"], "position_radius_m": 2}]})
+    model_config = with_example(cameras=["left"], position_radius_m=2)
 
     cameras: Annotated[list[Id], Field(min_length=1, max_length=32)] | None = Field(
         None,

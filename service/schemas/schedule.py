@@ -9,9 +9,9 @@ from datetime import UTC, datetime, timedelta
 from typing import Annotated, Self
 from zoneinfo import ZoneInfo
 
-from pydantic import ConfigDict, Field, StringConstraints, ValidationInfo, model_validator
+from pydantic import Field, StringConstraints, ValidationInfo, model_validator
 
-from service.schemas.base import Flag, Integer, Number, Schema, is_tolerant
+from service.schemas.base import Flag, Integer, Number, Schema, is_tolerant, with_example
 from service.schemas.options import Options
 
 FIELDS = 5
@@ -25,9 +25,7 @@ LONGEST_SPREAD = timedelta(minutes=15)
 class Schedule(Schema):
     """Schedule of automatic calibrations, with frames from the sources of the venue's cameras."""
 
-    model_config = ConfigDict(
-        json_schema_extra={"examples": [{"cron": "*/15 6-23 * * *", "time_zone": "Europe/Berlin"}]}
-    )
+    model_config = with_example(cron="*/15 6-23 * * *", time_zone="Europe/Berlin")
 
     cron: Annotated[str, StringConstraints(max_length=100)] = Field(
         description="Cron's five fields: minute, hour, day, month, day of the week."

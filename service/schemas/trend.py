@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, computed_field
 
-from service.schemas.base import OPEN_WORD, Id, Schema
+from service.schemas.base import OPEN_WORD, Id, Schema, with_example
 from service.schemas.geometry import PosedCamera
 
 
@@ -103,24 +103,18 @@ class TrendPoint(Schema):
 class Trend(Schema):
     """The trend of a camera since its anchor; `state` and `words` are those of the last night."""
 
-    model_config = ConfigDict(
-        json_schema_extra={
-            "examples": [
-                {
-                    "venue": "tsukuba",
-                    "camera": "left",
-                    "anchor": 2,
-                    "since": "2026-10-01T02:00:11Z",
-                    "state": "drifting",
-                    "words": "Camera left moved 4.2 cm at the far touchline since 3 November 2026, beyond what its own "
-                    "spread explains (EWMA).",
-                    "alarm_m": 0.05,
-                    "moved_m": 0.042,
-                    "baseline_nights": 20,
-                    "points": [],
-                }
-            ]
-        }
+    model_config = with_example(
+        venue="tsukuba",
+        camera="left",
+        anchor=2,
+        since="2026-10-01T02:00:11Z",
+        state="drifting",
+        words="Camera left moved 4.2 cm at the far touchline since 3 November 2026, beyond what its own "
+        "spread explains (EWMA).",
+        alarm_m=0.05,
+        moved_m=0.042,
+        baseline_nights=20,
+        points=[],
     )
 
     venue: Id = Field(description="Id of the venue.")

@@ -7,7 +7,6 @@ searches as long as it stands as they began with it. Otherwise the offer is abou
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import sqlalchemy as sa
 from pydantic import ValidationError
@@ -291,13 +290,12 @@ def _refusal(calibrated: _Calibrated, field: FieldOfPlay, number: AdoptableNumbe
 
 
 def _in_words(error: ValidationError) -> str:
-    return "; ".join(map(_reason, error.errors()))
-
-
-def _reason(finding: Mapping[str, Any]) -> str:
-    """Return what is wrong with a number of the lines, which is in metres: its unit is not in question."""
-    cause = finding.get("ctx", {}).get("error")
-    return cause.limits if isinstance(cause, LengthRefused) else finding["msg"].removeprefix("Value error, ")
+    """Return what is wrong with what the lines gave, which is in metres: its unit is not in question."""
+    causes = [(finding.get("ctx", {}).get("error"), finding["msg"]) for finding in error.errors()]
+    return "; ".join(
+        cause.limits if isinstance(cause, LengthRefused) else message.removeprefix("Value error, ")
+        for cause, message in causes
+    )
 
 
 # Cameras that were found
@@ -324,8 +322,7 @@ def _with_found(before: Venue | None, found: FoundSite, choice: Mapping[str, int
     try:
         placed = found.venue(choice)
     except ValidationError as error:
-        why = "; ".join(finding["msg"].removeprefix("Value error, ") for finding in error.errors())
-        raise Problem("candidate-refused", f"{why}.", job=job_id) from None
+        raise Problem("candidate-refused", f"{_in_words(error)}.", job=job_id) from None
     if before is None or found.began_with is None:
         return placed
     chosen = found.result.chosen(choice)

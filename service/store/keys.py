@@ -10,6 +10,7 @@ from typing import Any
 import sqlalchemy as sa
 
 from service.schemas.names import Scope
+from service.schemas.problems import Problem
 from service.store.database import Repository, advisory_lock, reading, writing
 from service.store.tables import api_keys
 
@@ -43,10 +44,6 @@ class Key:
         return self.expires_at is not None and self.expires_at <= datetime.now(UTC)
 
 
-class KeyExists(Exception):  # noqa: N818
-    """Raised where a key of this name exists."""
-
-
 def new_key() -> str:
     """Return a new key: 256 random bits behind a prefix that people, and scanners for leaked secrets, recognise."""
     return PREFIX + secrets.token_urlsafe(32)
@@ -74,12 +71,15 @@ class KeyRepository(Repository):
     def add(
         self, name: str, scope: Scope, expires_at: datetime | None = None, venues: Collection[str] | None = None
     ) -> str:
-        """Make a key and return it: the only time that it can be seen. `venues`: it is for no others; None: for all."""
+        """Make a key and return it: the only time that it can be seen. `venues`: it is for no others; None: for all.
+
+        Raises the problem `key-exists`.
+        """
         key = new_key()
         with writing(self._engine) as connection:
             advisory_lock(connection, "keys")
             if connection.scalar(sa.select(k.name).where(k.name == name)) is not None:
-                raise KeyExists
+                raise Problem("key-exists", f"Revoke {name} first, or take another name.")
             connection.execute(
                 sa.insert(api_keys).values(
                     name=name,

@@ -146,13 +146,7 @@ def _reported(row: Any, now: datetime) -> LiveState:
     watch = live_alarms.watch_in(row)
     newest, *_ = watch.senders
     others = [
-        LiveSender(
-            host=one.host,
-            pid=one.pid,
-            started_at=one.started_at,
-            reported_at=one.reported_at,
-            running=_is_running(one, now),
-        )
+        LiveSender.model_validate(one.model_dump() | {"running": _is_running(one, now)}, **TOLERANTLY)
         for one in watch.missed()
         if one is not newest
     ]

@@ -57,7 +57,7 @@ class OutboxRepository(Repository):
             rows = _due(connection, now, limit, running)
             begun = sa.update(tables.deliveries).where(d.id.in_([row.id for row in rows]))
             connection.execute(begun.values(attempts=d.attempts + 1, due_at=again_at))
-            return [_delivery(row) for row in rows]
+            return [Delivery(row.id, row.url, row.attempts + 1, row.event, row.receiver) for row in rows]
 
     def repair_due_times(self, now: datetime, again_at: datetime, longest_waits: Sequence[timedelta]) -> int:
         """Let those be due that wait for longer than they can have to: a clock that was ahead has been put right.
@@ -129,8 +129,8 @@ def add_delivery(
     connection: sa.Connection, url: str, now: datetime, *, job: str | None = None, event: int | None = None
 ) -> None:
     """Add the delivery of an event, or of the end of a job, to `url`, inside the caller's transaction."""
-    values = {"id": job or new_id(), "url": url, "receiver": _receiver(url), "status": "waiting", "due_at": now}
-    connection.execute(sa.insert(tables.deliveries).values(event=event, **values))
+    values = {"id": job or new_id(), "url": url, "receiver": urlsplit(url).hostname or "", "event": event}
+    connection.execute(sa.insert(tables.deliveries).values(status="waiting", due_at=now, **values))
 
 
 def deliveries_of(connection: sa.Connection, job_ids: Collection[str]) -> dict[str, CallbackState]:
@@ -147,11 +147,3 @@ def deliveries_of(connection: sa.Connection, job_ids: Collection[str]) -> dict[s
         )
         for row in rows
     }
-
-
-def _delivery(row: sa.Row[Any]) -> Delivery:
-    return Delivery(row.id, row.url, row.attempts + 1, row.event, row.receiver)
-
-
-def _receiver(url: str) -> str:
-    return urlsplit(url).hostname or ""

@@ -147,12 +147,12 @@ class AttemptRepository(Repository):
             submitter=task.origin.actor,
         )
         with writing(self._engine) as connection:
-            end_job(connection, task.job_id, _fence(task), end)
+            end_job(connection, task.job_id, _fences([task]), end)
 
     def fail(self, task: Task, error: JobError) -> None:
         """End a job without a result."""
         with writing(self._engine) as connection:
-            end_job(connection, task.job_id, _fence(task), End("failed", error=error))
+            end_job(connection, task.job_id, _fences([task]), End("failed", error=error))
 
     def hand_back(self, task: Task) -> bool:
         """Let a job wait again as if this attempt of it had not been; False if the attempt has ended or lost it."""
@@ -160,7 +160,7 @@ class AttemptRepository(Repository):
         if task.attempt == 1:
             as_before["started_at"] = None
         with writing(self._engine) as connection:
-            back = sa.update(tables.jobs).where(*_fence(task)).values(**as_before, **changed(clock(connection)))
+            back = sa.update(tables.jobs).where(*_fences([task])).values(**as_before, **changed(clock(connection)))
             return connection.execute(back).rowcount == 1
 
     def abandon(self, job_id: str, error: JobError, seconds: float) -> bool:
@@ -168,10 +168,6 @@ class AttemptRepository(Repository):
         with writing(self._engine) as connection:
             conditions = [*still_open(job_id), unheard_for(seconds, clock(connection))]
             return end_job(connection, job_id, conditions, End("failed", error=error))
-
-
-def _fence(task: Task) -> RowConditions:
-    return [j.id == task.job_id, j.run_token == task.run_token, j.status == "running"]
 
 
 def _fences(tasks: Collection[Task]) -> RowConditions:

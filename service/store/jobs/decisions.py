@@ -51,7 +51,7 @@ class DecisionRepository(Repository):
             taken, venue = _was_taken(job_id, newest), find_readable(connection, began_with.id)
             if venue is None:
                 return OpenDecisions(frozenset(), reject=taken)
-            if not _untouched(venue, began_with, result, taken=taken):
+            if not _is_untouched(venue, began_with, result, taken=taken):
                 return OpenDecisions(frozenset(), taken, is_outdated=not taken)
             refused_for = faults_of(with_result(venue, result))
             return OpenDecisions(frozenset() if refused_for else _not_taken(venue, result), reject=taken)
@@ -79,7 +79,7 @@ class DecisionRepository(Repository):
                 changes = with_night(changes, now_stored, result, chosen, job_id, by_hand=True)
                 write_changes(connection, with_alarms(changes, now_stored))
                 return
-            if stored is None or not _untouched(stored.venue, began_with, result, taken=left_by_it):
+            if stored is None or not _is_untouched(stored.venue, began_with, result, taken=left_by_it):
                 raise venue_moved_on(began_with.id, job_id, newest)
             memories = _without_refused(newest_memories(connection, began_with.id), result, chosen)
             changes = with_calibration(changes, result, moved=True)
@@ -121,36 +121,24 @@ def _was_taken(job_id: str, newest: Revision | None) -> bool:
     return newest is not None and newest.job == job_id and newest.cause in CALIBRATION_CAUSES
 
 
-def _untouched(now_stored: Venue, began_with: Venue, result: Result, *, taken: bool) -> bool:
-    """True if nothing but a calibration itself has changed a venue since it began."""
-    return (_lies_between if taken else _is_as_it_was)(now_stored, began_with, result)
+def _is_untouched(now_stored: Venue, began_with: Venue, result: Result, *, taken: bool) -> bool:
+    """True if nothing but a calibration itself, if its poses were `taken`, has changed a venue since it began."""
+    if not taken:
+        return now_stored.has_same_calibration_input_as(began_with)
+    found = with_result(began_with, result)
+    if now_stored.field not in (began_with.field, found.field) or now_stored.poses.keys() != began_with.poses.keys():
+        return False
+    # Each camera has the pose that the calibration began with, or the one that it found.
+    venues = (now_stored, began_with, found)
+    cameras = zip(*(venue.poses_and_lenses for venue in venues), strict=True)
+    return all(now in (before, after) for now, before, after in cameras)
 
 
 def _not_taken(now_stored: Venue, result: Result) -> frozenset[str]:
     """Return the cameras whose stored pose or lens differs from the one that a calibration found."""
     found = with_result(now_stored, result)
-    pairs = zip(now_stored.cameras, now_stored.poses_and_lenses, found.poses_and_lenses, strict=True)
-    return frozenset(camera.id for camera, now, then in pairs if now != then)
-
-
-def _is_as_it_was(now_stored: Venue, began_with: Venue, _: Result) -> bool:
-    """True if a calibration would begin with the same input again."""
-    return now_stored.has_same_calibration_input_as(began_with)
-
-
-def _lies_between(now_stored: Venue, began_with: Venue, result: Result) -> bool:
-    """True if each camera has the pose that a calibration began with or found, and all else is unchanged."""
-    found = with_result(began_with, result)
-    return (
-        now_stored.field in (began_with.field, found.field)
-        and now_stored.poses.keys() == began_with.poses.keys()
-        and all(
-            now in ways
-            for now, *ways in zip(
-                now_stored.poses_and_lenses, began_with.poses_and_lenses, found.poses_and_lenses, strict=True
-            )
-        )
-    )
+    pairs = zip(now_stored.poses_and_lenses, found.poses_and_lenses, strict=True)
+    return frozenset(now.id for now, then in pairs if now != then)
 
 
 def _without_refused(memories: Memories, result: Result, chosen: Collection[str]) -> Memories:

@@ -17,6 +17,11 @@ from service.store.unreadable import read_each, reading_row
 
 j = tables.jobs.c
 r = tables.revisions.c
+# Members that a past calibration has from its result.
+OF_RESULTS = (
+    *("verdict", "accepted", "rejected_because"),
+    *("stitch_error_px", "stitch_error_before_px", "stitch_error_limit_px"),
+)
 
 
 @dataclass(frozen=True)
@@ -97,21 +102,13 @@ def _newest_calibrations(venue: str, *columns: Any) -> sa.Select[Any]:
 
 def _past(row: Any) -> PastCalibration:
     with reading_row("job", row.id):
-        return _past_in(row, row.result or {})
-
-
-def _past_in(row: Any, result: dict[str, Any]) -> PastCalibration:
-    return PastCalibration(
-        job=row.id,
-        status=row.status,
-        finished_at=row.finished_at,
-        verdict=result.get("verdict"),
-        accepted=result.get("accepted"),
-        rejected_because=result.get("rejected_because"),
-        error=(row.error or {}).get("detail"),
-        stitch_error_px=result.get("stitch_error_px"),
-        stitch_error_before_px=result.get("stitch_error_before_px"),
-        stitch_error_limit_px=result.get("stitch_error_limit_px"),
-        moved={camera["id"]: Moved.model_construct(**camera["moved"]) for camera in result.get("cameras", [])},
-        dry_run=row.options["dry_run"],
-    )
+        result = row.result or {}
+        return PastCalibration(
+            job=row.id,
+            status=row.status,
+            finished_at=row.finished_at,
+            error=(row.error or {}).get("detail"),
+            moved={camera["id"]: Moved.model_construct(**camera["moved"]) for camera in result.get("cameras", [])},
+            dry_run=row.options["dry_run"],
+            **{name: result.get(name) for name in OF_RESULTS},
+        )

@@ -3,7 +3,8 @@ from datetime import UTC, datetime, timedelta
 
 import pytest
 
-from service.store.keys import LONGEST_NAME, KeyExists, KeyRepository, hash_of, old_name
+from service.schemas.problems import Problem
+from service.store.keys import LONGEST_NAME, KeyRepository, hash_of, old_name
 from testbed.homes import in_both_homes
 
 NOON = datetime(2026, 11, 21, 12, tzinfo=UTC)
@@ -42,7 +43,7 @@ def test_a_key_is_found_until_it_is_removed(keys):
 @in_both_homes
 def test_a_name_is_of_one_key(keys):
     keys.add("cron", "read")
-    with pytest.raises(KeyExists):
+    with pytest.raises(Problem, match="Revoke cron first"):
         keys.add("cron", "admin")
     assert [key.scope for key in keys.all()] == ["read"]
 
