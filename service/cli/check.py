@@ -63,7 +63,7 @@ def check(
         cameras = found.with_frames(list(files))
         for name, images in files.items():
             for data in images:
-                image_checks.check_frame(name, data, settings)
+                image_checks.check_whole(data, settings, camera=name)
     from worker.compute_resources import ComputeResources
     from worker.jobs import check as checking
 

@@ -93,7 +93,7 @@ def intrinsics(
     files = {str(path): path.read_bytes() for path in photos}
     with engine_progress() as show:
         for name, data in files.items():
-            image_checks.check_photo(name, data, settings)
+            image_checks.check_whole(data, settings, photo=name)
         solution = intrinsics.solve(files, options, show)
     output.write_text(solution.result.model_dump_json(indent=2) + "\n")
     if picture is not None:

@@ -94,23 +94,13 @@ def check(
 
     `of_any_size`: frames of its shape will do, which are resized; points are clicked in pixels of its size.
     """
-    size = _size_of_whole_picture(data, settings, camera=camera.id)
+    size = check_whole(data, settings, camera=camera.id)
     wanted = camera.image_size
     if wanted is not None and size != wanted and not (of_any_size and is_resized(size, wanted)):
         words = other_shape(camera.id, size, wanted) if of_any_size else other_size(camera.id, size, wanted)
         raise Problem("frame-size", words, camera=camera.id, expected=wanted, got=size)
     # A frame of another size is resized to that of its camera.
     budget.spend(wanted or size, camera=camera.id)
-
-
-def check_photo(name: str, data: bytes, settings: Settings) -> None:
-    """Raise a problem unless a photo of a board is an entire JPEG or PNG of any size."""
-    _size_of_whole_picture(data, settings, photo=name)
-
-
-def check_frame(camera: str, data: bytes, settings: Settings) -> list[int]:
-    """Return width and height of a frame of a camera of any size; raises a problem unless it is entire."""
-    return _size_of_whole_picture(data, settings, camera=camera)
 
 
 def check_length(length: int, settings: Settings, **part: Any) -> None:
@@ -128,8 +118,11 @@ def in_words(part: Mapping[str, Any]) -> str:
     return " ".join(f"{kind} {name}" for kind, name in part.items())
 
 
-def _size_of_whole_picture(data: bytes, settings: Settings, **parts: Any) -> list[int]:
-    """Return width and height of a picture, or raise a problem if it is not entire; `parts` name it."""
+def check_whole(data: bytes, settings: Settings, **parts: Any) -> list[int]:
+    """Return width and height of a JPEG or PNG of any size; raises a problem unless it is entire.
+
+    `parts`: the name of its `camera` or `photo`.
+    """
     subject = in_words(parts)
     if not data:
         raise Problem("empty-frame", f"The file of {subject} is empty; was it still being written?", **parts)

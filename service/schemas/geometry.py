@@ -195,6 +195,12 @@ def require_camera_id(camera_id: str) -> None:
         raise ValueError("a camera cannot be called 'options': that is a part of the upload")
 
 
+def require_above_pitch(what: str, height_m: float) -> None:
+    """Raise `ValueError` for a place on the ground or below it."""
+    if height_m <= 0:
+        raise ValueError(f"{what} stands at z = {height_m:.6g} m: z points up, and a camera must be above the pitch")
+
+
 def check_lens(lens: Intrinsics, image_size: list[int]) -> None:
     """Raise `ValueError` for a lens in a request that has no rays for its picture; stored lenses were checked once."""
     if lens.model not in DISTORTION_LENGTHS:

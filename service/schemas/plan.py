@@ -9,7 +9,16 @@ from service.schemas.addresses import SourceUrl
 from service.schemas.base import OPEN_WORD, Id, Integer, Number, Schema
 from service.schemas.field import PitchPoint
 from service.schemas.find import SoughtCameraIn, SoughtSite
-from service.schemas.geometry import Intrinsics, Light, PoseIn, Position, Side, check_lens, require_camera_id
+from service.schemas.geometry import (
+    Intrinsics,
+    Light,
+    PoseIn,
+    Position,
+    Side,
+    check_lens,
+    require_above_pitch,
+    require_camera_id,
+)
 from service.schemas.results import Sigma
 from service.schemas.venue import Ignore, VenueSettings, require_distinct_ids
 
@@ -59,11 +68,8 @@ class PlannedCameraIn(Schema):
             raise ValueError(f"camera {self.id} needs one direction: look_at, pan_deg with tilt_deg, or a pose")
         if (self.position is None) != (self.pose is not None):
             raise ValueError(f"camera {self.id} needs one place: position, or the one of its pose")
-        if self.position is not None and self.position[2] <= 0:
-            raise ValueError(
-                f"camera {self.id} stands at z = {self.position[2]:.6g} m: z points up, and a camera must be above the "
-                "pitch"
-            )
+        if self.position is not None:
+            require_above_pitch(f"camera {self.id}", self.position[2])
         if self.look_at is not None and self.position is not None and self.look_at == self.position[:2]:
             raise ValueError(f"camera {self.id} looks straight down: give pan_deg and tilt_deg in place of look_at")
         return self
@@ -108,10 +114,7 @@ class StandIn(Schema):
 
     @model_validator(mode="after")
     def _above_the_pitch(self) -> Self:
-        if self.position[2] <= 0:
-            raise ValueError(
-                f"stand {self.id} is at z = {self.position[2]:.6g} m: z points up, it must be above the pitch"
-            )
+        require_above_pitch(f"stand {self.id}", self.position[2])
         return self
 
 

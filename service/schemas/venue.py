@@ -11,7 +11,7 @@ from service.schemas.base import OPEN_WORD, UNREADABLE, Id, Name, Number, Schema
 from service.schemas.encoders import LensEncoders
 from service.schemas.events.webhooks import WEBHOOK_EXAMPLE, Webhook
 from service.schemas.field import FieldOfPlay
-from service.schemas.geometry import Light, Pose, PosedCamera, PoseIn, UnposedCamera, check_lens
+from service.schemas.geometry import Light, Pose, PosedCamera, PoseIn, UnposedCamera, check_lens, require_above_pitch
 from service.schemas.health import Alarm, Alarms, CalibrationEnd
 from service.schemas.options import Options
 from service.schemas.schedule import Schedule
@@ -93,11 +93,7 @@ class CameraIn(UnposedCamera):
 
     @model_validator(mode="after")
     def _above_the_pitch(self) -> Self:
-        height = Pose.from_input(self.pose).position[2]
-        if height <= 0:
-            raise ValueError(
-                f"camera {self.id} stands at z = {height:.6g} m: z points up, and a camera must be above the pitch"
-            )
+        require_above_pitch(f"camera {self.id}", Pose.from_input(self.pose).position[2])
         return self
 
 

@@ -12,7 +12,7 @@ from contextlib import suppress
 from datetime import timedelta
 from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Concatenate, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, Concatenate, ParamSpec, TypeVar, cast
 from urllib.parse import unquote, urlparse
 
 import obstore
@@ -87,7 +87,8 @@ class Blobs:
             if self._folder
             else from_url(
                 url,
-                config=_credentials(),
+                # obstore finds those that stand in no files in the environment.
+                config=cast("S3Config", bucket_credentials(os.environ)),
                 client_options=_client_options(patience_s),
                 retry_config=_retry_options(patience_s),
             )
@@ -230,14 +231,6 @@ def _damage(data: bytes, stored_at: str) -> str | None:
     if hashed is not None and hashlib.sha256(data).hexdigest() != hashed[1]:
         return f"its {len(data)} bytes are not those that were stored"
     return None
-
-
-def _credentials() -> S3Config:
-    """Return the bucket credentials that stand in files; obstore finds the others in the environment."""
-    found: S3Config = {}
-    for name, secret in bucket_credentials(os.environ).items():
-        found[name] = secret
-    return found
 
 
 def _client_options(patience_s: float) -> ClientConfig:

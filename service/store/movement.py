@@ -54,34 +54,32 @@ def picture_motion(field: FieldOfPlay, then: tuple[int, PosedCamera], now: tuple
     half = np.array([field.length_m, field.width_m]) / 2 + BESIDE_M
     steps = [np.linspace(-side, side, GRID) for side in half]
     ground = np.stack(np.meshgrid(*steps), axis=-1).reshape(-1, 2)
-    on_ground = _homography(before, pixels(before, ground), after, pixels(after, ground))
+    on_ground, ground_residual_px = _homography(before, pixels(before, ground), after, pixels(after, ground))
     (fx, _, _), (_, fy, _), _ = before.intrinsics.matrix
     width, height = before.image_size
     sides = np.meshgrid(np.linspace(-1, 1, GRID) * width / fx, np.linspace(-1, 1, GRID) * height / fy)
     rays = np.stack([*sides, np.ones_like(sides[0])], axis=-1).reshape(-1, 3)
     turn = _rotation(after) @ _rotation(before).T
-    far = _homography(before, _seen(before, rays), after, _seen(after, rays @ turn.T))
+    far, far_residual_px = _homography(before, _seen(before, rays), after, _seen(after, rays @ turn.T))
     return PictureMotion(
         since=since,
         revision=revision,
         image_size=after.image_size,
-        ground=None if on_ground is None else on_ground[0],
-        ground_residual_px=None if on_ground is None else on_ground[1],
-        far=None if far is None else far[0],
-        far_residual_px=None if far is None else far[1],
+        ground=on_ground,
+        ground_residual_px=ground_residual_px,
+        far=far,
+        far_residual_px=far_residual_px,
     )
 
 
 def _homography(
     before: PosedCamera, was: Array, after: PosedCamera, now: Array
-) -> tuple[list[list[float]], float] | None:
+) -> tuple[list[list[float]] | None, float | None]:
     """Return the homography between pixels (N, 2), and the largest distance from it; None if both see too few."""
     seen = _inside(before, was) & _inside(after, now)
-    if seen.sum() < LEAST_SEEN:
-        return None
-    found, _ = cv2.findHomography(was[seen], now[seen])
+    found = cv2.findHomography(was[seen], now[seen])[0] if seen.sum() >= LEAST_SEEN else None
     if found is None:
-        return None
+        return None, None
     residuals = cv2.perspectiveTransform(was[seen][None], found)[0] - now[seen]
     return found.tolist(), float(np.linalg.norm(residuals, axis=1).max())
 

@@ -101,7 +101,7 @@ class WorkerRepository(Repository):
             now = clock(connection)
             return Round(
                 _beat(connection, now, name, token, len(unreadable_jobs)),
-                _silent(connection, now, silence_s),
+                [worker.name for worker in heartbeats(connection, now) if worker.is_silent(silence_s)],
                 silent_jobs(connection, now, silence_s, but=unreadable_jobs),
             )
 
@@ -121,11 +121,6 @@ class WorkerRepository(Repository):
         with reading(self._engine) as connection:
             return [worker for worker in heartbeats(connection, clock(connection)) if worker.is_alive(silence_s)]
 
-    def silent(self, silence_s: float) -> list[str]:
-        """Return the workers that were not seen within `silence_s`."""
-        with reading(self._engine) as connection:
-            return _silent(connection, clock(connection), silence_s)
-
     def forget(self, name: str, silence_s: float) -> None:
         """Forget a worker, unless it has come back meanwhile."""
         with writing(self._engine) as connection:
@@ -139,10 +134,6 @@ def _beat(connection: sa.Connection, now: datetime, name: str, token: str | None
     of_this_start = [w.name == name, w.token.is_not_distinct_from(token)]
     beat = sa.update(workers).where(*of_this_start).values(seen_at=now, unreadable_jobs=unreadable_jobs)
     return connection.execute(beat).rowcount == 1
-
-
-def _silent(connection: sa.Connection, now: datetime, silence_s: float) -> list[str]:
-    return [worker.name for worker in heartbeats(connection, now) if worker.is_silent(silence_s)]
 
 
 def heartbeats(connection: sa.Connection, now: datetime) -> list[WorkerHeartbeat]:

@@ -93,7 +93,7 @@ def test_processes_that_start_together_make_the_schema_once(home, tmp_path):
     engines = [connect(home.database_url(tmp_path)) for _ in range(4)]
     with ThreadPoolExecutor(4) as pool:
         list(pool.map(migrate, engines))
-    assert WorkerRepository(engines[0]).silent(0) == []
+    assert WorkerRepository(engines[0]).beat_and_listen("nobody", None, 0).silent_workers == []
     for engine in engines:
         engine.dispose()
 
@@ -197,7 +197,7 @@ def test_workers_are_not_dead_because_the_clock_of_their_machine_is_wrong(engine
     with monkeypatch.context() as patch:
         patch.setattr("service.store.database.datetime", late)
         WorkerRepository(engine).register("w", None)
-    assert WorkerRepository(engine).silent(10) == []
+    assert WorkerRepository(engine).beat_and_listen("nobody", None, 10).silent_workers == []
 
 
 def two_count_at_once(monkeypatch):

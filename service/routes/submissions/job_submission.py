@@ -100,9 +100,9 @@ def _submission(
         for upload in several:
             with context.uploads.content(upload) as data:
                 if kind == "intrinsics":
-                    image_checks.check_photo(name, data, context.settings)
+                    image_checks.check_whole(data, context.settings, photo=name)
                 elif about is None:
-                    budget.spend(image_checks.check_frame(name, data, context.settings), camera=name)
+                    budget.spend(image_checks.check_whole(data, context.settings, camera=name), camera=name)
                 else:
                     resize = kind != "locate"
                     image_checks.check(cameras[name], data, context.settings, budget, of_any_size=resize)

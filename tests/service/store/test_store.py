@@ -68,7 +68,7 @@ def test_a_silent_worker_is_noticed_and_may_come_back(engine):
     workers = WorkerRepository(engine)
     workers.register("w", None)
     assert [worker.name for worker in workers.alive(5)] == ["w"]
-    assert workers.silent(0) == ["w"]
+    assert workers.beat_and_listen("nobody", None, 0).silent_workers == ["w"]
     workers.forget("w", 5)
     assert workers.beat("w")
     workers.forget("w", 0)
@@ -85,10 +85,10 @@ def test_a_worker_that_died_before_its_clock_was_put_right_is_noticed_as_soon_as
         connection.execute(sa.update(tables.workers).where(tables.workers.c.name == "dead").values(seen_at=ahead))
     # Nobody knows: it may only not have given a sign of life since.
     assert [worker.name for worker in workers.alive(10)] == ["alive"]
-    assert workers.silent(10) == []
+    assert workers.beat_and_listen("nobody", None, 10).silent_workers == []
     workers.beat("alive")
     time.sleep(0.1)
-    assert workers.silent(0.05) == ["alive", "dead"]
+    assert workers.beat_and_listen("nobody", None, 0.05).silent_workers == ["alive", "dead"]
 
 
 @in_both_homes
