@@ -5,7 +5,6 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from service.schemas.job import Job
 from service.schemas.names import OPTIONS_PART, Scope
 
 SCHEMAS = "#/components/schemas/"
@@ -60,14 +59,6 @@ def frames_form_body(options: type[BaseModel], *, required: bool = True) -> dict
         "camera: they are laid onto each other, so that its shaking blurs no line, and what walks by vanishes.",
         required=required,
     )
-
-
-def submission_responses(known: str = "This content is already a job") -> dict[int | str, dict[str, Any]]:
-    """Return entries for `responses=` of a route that makes a job; `known`: description where there is no new one."""
-    return {
-        200: {"model": Job, "description": known, **header_docs("ETag")},
-        202: header_docs("ETag", "Location", "Retry-After"),
-    }
 
 
 def needs_scope(scope: Scope) -> dict[str, Any]:

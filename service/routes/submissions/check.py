@@ -9,15 +9,14 @@ from service.formats.nodes import FileRefusedError
 from service.formats.parsing import MOST_BYTES
 from service.formats.reading import CalibrationFile, read_uploads
 from service.intake import image_checks
-from service.routes.contract.documented import FILE, form_body, needs_scope, submission_responses
+from service.routes.contract.documented import FILE, form_body
 from service.routes.contract.guarded import Guarded
-from service.routes.contract.problem_docs import OF_UPLOADS, problem_responses
+from service.routes.contract.problem_docs import OF_UPLOADS
 from service.routes.submissions import forms, job_submission
 from service.routes.submissions.find import MOST_CAMERAS
 from service.routes.submissions.intrinsics import printable_name
-from service.routes.submissions.job_submission import FromSender, Sender
+from service.routes.submissions.job_submission import FromSender, Sender, submits_job
 from service.schemas.check import CheckedFile, CheckOptions
-from service.schemas.job import Job
 from service.schemas.names import CALIBRATION_PART, OPTIONS_PART
 from service.schemas.problems import Problem
 
@@ -25,6 +24,7 @@ router = APIRouter(tags=["jobs"], route_class=Guarded)
 
 # Some for each camera: there are tools that write several.
 MOST_CALIBRATION_FILES = 100
+PROBLEMS = (*OF_UPLOADS, "calibration-refused", "missing-camera", "unknown-camera", "too-many-frames")
 UPLOAD = form_body(
     CheckOptions,
     "The calibration, each of its files a part `calibration` with its file name, and a JPEG or PNG of each camera to "
@@ -34,14 +34,7 @@ UPLOAD = form_body(
 )
 
 
-@router.post(
-    "/check",
-    status_code=202,
-    response_model=Job,
-    responses=submission_responses()
-    | problem_responses(*OF_UPLOADS, "calibration-refused", "missing-camera", "unknown-camera", "too-many-frames"),
-    openapi_extra=UPLOAD | needs_scope("calibrate"),
-)
+@submits_job(router, "/check", UPLOAD, PROBLEMS)
 async def submit_check(request: Request, context: InContext, sender: FromSender) -> Response:
     """Check the calibration of any tool by frames of its cameras: a grade for each, how far it is off, and why.
 

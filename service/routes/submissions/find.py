@@ -7,13 +7,12 @@ from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import FormData
 
 from service.api.context import Context, InContext, VenueIdPath
-from service.routes.contract.documented import form_body, needs_scope, sent_reference, submission_responses
+from service.routes.contract.documented import form_body, sent_reference
 from service.routes.contract.guarded import Guarded
-from service.routes.contract.problem_docs import OF_FRAMES, problem_responses
+from service.routes.contract.problem_docs import OF_FRAMES
 from service.routes.submissions import forms, job_submission
-from service.routes.submissions.job_submission import FromSender, Sender
+from service.routes.submissions.job_submission import FromSender, Sender, submits_job
 from service.schemas.find import SoughtSite
-from service.schemas.job import Job
 from service.schemas.names import OPTIONS_PART, SITE_PART
 from service.schemas.options import FindOptions
 from service.schemas.problems import Problem
@@ -25,6 +24,7 @@ router = APIRouter(tags=["jobs"], route_class=Guarded)
 MOST_CAMERAS = 32
 # Options about stored cameras; a site says the same of its own.
 ABOUT_STORED = ("cameras", "find_lens", "position_radius_m")
+OF_SITES = ("site-missing", "nothing-to-find", "venue-id-mismatch", "venue-stored", "no-such-camera")
 UPLOAD = form_body(
     FindOptions,
     "A JPEG or PNG file per camera that is to be found, the part named by the camera's id; repeat a part to send "
@@ -35,16 +35,7 @@ UPLOAD = form_body(
 UPLOAD["requestBody"]["content"]["multipart/form-data"]["encoding"][SITE_PART] = {"contentType": "application/json"}
 
 
-@router.post(
-    "/venues/{venue_id}/find",
-    status_code=202,
-    response_model=Job,
-    responses=submission_responses()
-    | problem_responses(
-        *OF_FRAMES, "site-missing", "nothing-to-find", "venue-id-mismatch", "venue-stored", "no-such-camera"
-    ),
-    openapi_extra=UPLOAD | needs_scope("calibrate"),
-)
+@submits_job(router, "/venues/{venue_id}/find", UPLOAD, (*OF_FRAMES, *OF_SITES))
 async def submit_camera_search(
     venue_id: VenueIdPath, request: Request, context: InContext, sender: FromSender
 ) -> Response:

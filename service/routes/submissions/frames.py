@@ -5,13 +5,12 @@ from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import FormData
 
 from service.api.context import Context, InContext
-from service.routes.contract.documented import frames_form_body, needs_scope, submission_responses
+from service.routes.contract.documented import frames_form_body
 from service.routes.contract.guarded import Guarded
-from service.routes.contract.problem_docs import OF_FRAMES, OF_SOURCES, problem_responses
+from service.routes.contract.problem_docs import OF_FRAMES, OF_SOURCES
 from service.routes.submissions import forms, job_submission
-from service.routes.submissions.job_submission import FromSender, Sender
+from service.routes.submissions.job_submission import FromSender, Sender, submits_job
 from service.routes.venues import ExistingVenue
-from service.schemas.job import Job
 from service.schemas.names import JobKind
 from service.schemas.options import FieldOptions, Options
 from service.schemas.venue import Venue
@@ -19,12 +18,11 @@ from service.schemas.venue import Venue
 router = APIRouter(tags=["jobs"], route_class=Guarded)
 
 
-@router.post(
+@submits_job(
+    router,
     "/venues/{venue_id}/calibrate",
-    status_code=202,
-    response_model=Job,
-    responses=submission_responses() | problem_responses(*OF_FRAMES, *OF_SOURCES, "venue-busy"),
-    openapi_extra=frames_form_body(Options, required=False) | needs_scope("calibrate"),
+    frames_form_body(Options, required=False),
+    (*OF_FRAMES, *OF_SOURCES, "venue-busy"),
 )
 async def submit_calibration(
     venue: ExistingVenue, request: Request, context: InContext, sender: FromSender
@@ -39,13 +37,7 @@ async def submit_calibration(
     return await _uploaded(Options, venue, request, context, sender)
 
 
-@router.post(
-    "/venues/{venue_id}/field/fit",
-    status_code=202,
-    response_model=Job,
-    responses=submission_responses() | problem_responses(*OF_FRAMES),
-    openapi_extra=frames_form_body(FieldOptions) | needs_scope("calibrate"),
-)
+@submits_job(router, "/venues/{venue_id}/field/fit", frames_form_body(FieldOptions), OF_FRAMES)
 async def submit_field_fit(venue: ExistingVenue, request: Request, context: InContext, sender: FromSender) -> Response:
     """Fit length, width and ridge of the pitch to the frames of all cameras. The stored venue stays as it is.
 

@@ -7,12 +7,11 @@ from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import FormData, UploadFile
 
 from service.api.context import Context, InContext
-from service.routes.contract.documented import FILE, form_body, needs_scope, submission_responses
+from service.routes.contract.documented import FILE, form_body
 from service.routes.contract.guarded import Guarded
-from service.routes.contract.problem_docs import OF_UPLOADS, problem_responses
+from service.routes.contract.problem_docs import OF_UPLOADS
 from service.routes.submissions import forms, job_submission
-from service.routes.submissions.job_submission import FromSender, Sender
-from service.schemas.job import Job
+from service.routes.submissions.job_submission import FromSender, Sender, submits_job
 from service.schemas.names import OPTIONS_PART, PHOTOS_PART
 from service.schemas.options import IntrinsicsOptions
 from service.schemas.problems import Problem
@@ -29,13 +28,7 @@ UPLOAD = form_body(
 )
 
 
-@router.post(
-    "/intrinsics",
-    status_code=202,
-    response_model=Job,
-    responses=submission_responses() | problem_responses(*OF_UPLOADS, "missing-photos", "too-many-photos"),
-    openapi_extra=UPLOAD | needs_scope("calibrate"),
-)
+@submits_job(router, "/intrinsics", UPLOAD, (*OF_UPLOADS, "missing-photos", "too-many-photos"))
 async def submit_lens_calibration(request: Request, context: InContext, sender: FromSender) -> Response:
     """Submit photos of a board, from which a job finds the lens. Its picture `coverage.jpg` shows what it rests on."""
     most = context.settings.max_photos

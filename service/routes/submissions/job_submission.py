@@ -1,16 +1,18 @@
 """Submission of jobs: the files of a form are checked, stored, and become a job."""
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any, TypeVar
 
-from fastapi import Depends, Header, Request, Response
+from fastapi import APIRouter, Depends, Header, Request, Response
 from starlette.datastructures import UploadFile
 
 from service.api.context import Context
 from service.intake import image_checks
 from service.intake.submit import frame_paths
+from service.routes.contract.documented import header_docs, needs_scope
+from service.routes.contract.problem_docs import problem_responses
 from service.routes.jobs import job_response
 from service.schemas.find import SoughtSite
 from service.schemas.job import Job
@@ -21,6 +23,7 @@ from service.store.jobs.files import frame_path
 from service.store.jobs.submission import Submission
 from service.store.jobs.task import AnyOptions, Origin, kind_of, seeded
 
+Endpoint = TypeVar("Endpoint", bound=Callable[..., Any])
 # Files by camera; photos by name.
 Files = Mapping[str, Sequence[UploadFile]]
 
@@ -47,6 +50,27 @@ def _sender(
 
 
 FromSender = Annotated[Sender, Depends(_sender)]
+
+
+def submits_job(
+    router: APIRouter,
+    path: str,
+    body: Mapping[str, Any],
+    problems: Sequence[str],
+    known: str = "This content is already a job",
+) -> Callable[[Endpoint], Endpoint]:
+    """Return the decorator of a route that makes a job of a body; `known`: description where there is no new one."""
+    responses: dict[int | str, dict[str, Any]] = {
+        200: {"model": Job, "description": known, **header_docs("ETag")},
+        202: header_docs("ETag", "Location", "Retry-After"),
+    }
+    return router.post(
+        path,
+        status_code=202,
+        response_model=Job,
+        responses=responses | problem_responses(*problems),
+        openapi_extra={**body, **needs_scope("calibrate")},
+    )
 
 
 def submit_files(

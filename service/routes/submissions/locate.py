@@ -7,12 +7,12 @@ from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import FormData, UploadFile
 
 from service.api.context import CameraIdPath, Context, InContext
-from service.routes.contract.documented import form_body, needs_scope, submission_responses
+from service.routes.contract.documented import form_body
 from service.routes.contract.guarded import Guarded
-from service.routes.contract.problem_docs import OF_FRAMES, problem_responses
+from service.routes.contract.problem_docs import OF_FRAMES
 from service.routes.jobs import job_response, wait_for_end
 from service.routes.submissions import forms, job_submission
-from service.routes.submissions.job_submission import FromSender, Sender
+from service.routes.submissions.job_submission import FromSender, Sender, submits_job
 from service.routes.venues import ExistingVenue
 from service.schemas.job import Job
 from service.schemas.names import OPTIONS_PART
@@ -31,13 +31,12 @@ UPLOAD = form_body(
 )
 
 
-@router.post(
+@submits_job(
+    router,
     "/venues/{venue_id}/cameras/{camera}/locate",
-    status_code=202,
-    response_model=Job,
-    responses=submission_responses("The job has ended, or this content is already a job")
-    | problem_responses(*OF_FRAMES),
-    openapi_extra=UPLOAD | needs_scope("calibrate"),
+    UPLOAD,
+    OF_FRAMES,
+    known="The job has ended, or this content is already a job",
 )
 async def submit_first_pose(
     venue: ExistingVenue,

@@ -5,11 +5,10 @@ import hashlib
 from fastapi import APIRouter, Request, Response
 
 from service.api.context import Context, InContext
-from service.routes.contract.documented import needs_scope, submission_responses
 from service.routes.contract.guarded import Guarded
-from service.routes.contract.problem_docs import problem_responses
 from service.routes.jobs import ExistingJob
 from service.routes.submissions import forms, job_submission
+from service.routes.submissions.job_submission import submits_job
 from service.routes.venues import existing_venue
 from service.schemas.job import Job
 from service.schemas.options import Options
@@ -30,29 +29,17 @@ OF_COPIES = (
     "queue-full",
     "disk-full",
 )
+KNOWN = "It is being computed"
 router = APIRouter(prefix="/jobs", tags=["jobs"], route_class=Guarded)
 
 
-@router.post(
-    "/{job_id}/again",
-    status_code=202,
-    response_model=Job,
-    openapi_extra=needs_scope("calibrate"),
-    responses=submission_responses("It is being computed") | problem_responses(*OF_COPIES),
-)
+@submits_job(router, "/{job_id}/again", {}, OF_COPIES, known=KNOWN)
 def resubmit_job(job: ExistingJob, request: Request, context: InContext) -> Response:
     """Submit the frames of a job again, with its options, as long as its frames are kept."""
     return submit(context, job, request.state.origin)
 
 
-@router.post(
-    "/{job_id}/calibrate",
-    status_code=202,
-    response_model=Job,
-    openapi_extra=needs_scope("calibrate"),
-    responses=submission_responses("It is being computed")
-    | problem_responses(*OF_COPIES, "poses-not-found", "missing-camera"),
-)
+@submits_job(router, "/{job_id}/calibrate", {}, (*OF_COPIES, "poses-not-found", "missing-camera"), known=KNOWN)
 def calibrate_found_cameras(job: ExistingJob, request: Request, context: InContext) -> Response:
     """Calibrate a venue with the frames of a search for its cameras, once what was found is stored.
 
