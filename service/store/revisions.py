@@ -175,8 +175,7 @@ def _with_state(
         camera.id: {"pose": camera.pose, "intrinsics": camera.intrinsics.with_sigma_of(now[camera.id])}
         for camera in cameras
     }
-    field = FieldOfPlay.model_validate(venue.field.model_dump() | numbers | {"ridge": ridge})
-    return venue.with_cameras(then, field=field)
+    return venue.with_cameras(then, field=venue.field.changed({**numbers, "ridge": ridge}))
 
 
 def _in_words(sizes: dict[str, list[int]]) -> str:

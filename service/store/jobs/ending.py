@@ -163,12 +163,12 @@ def _stored_venue(state: JobState) -> StoredVenue | None:
 
 def _webhooks_of(state: JobState) -> list[Webhook]:
     """Return the webhooks of a venue, whatever else of it cannot be read."""
-    none: list[Webhook] = []
-    return read_or(none, "venue", str(state.unchanged.before.venue_id), lambda: _webhooks_in(state.document or {}))
 
+    def read() -> list[Webhook]:
+        documents = (state.document or {}).get("webhooks") or ()
+        return [Webhook.model_validate(webhook, **TOLERANTLY) for webhook in documents]
 
-def _webhooks_in(document: Document) -> list[Webhook]:
-    return [Webhook.model_validate(webhook, **TOLERANTLY) for webhook in document.get("webhooks") or ()]
+    return read_or([], "venue", str(state.unchanged.before.venue_id), read)
 
 
 def _write(connection: sa.Connection, state: JobState, end: End, changes: Changes, result: AnyResult | None) -> None:

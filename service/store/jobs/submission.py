@@ -1,6 +1,7 @@
 """Submission: frames and options of a client become a job, or are found to be one already."""
 
 import hashlib
+from dataclasses import asdict
 from datetime import datetime, timedelta
 from typing import Any
 
@@ -177,10 +178,7 @@ def _insert(
         "venue_document": None if venue is None else to_document(venue),
         "site": None if submission.site is None else to_document(submission.site),
         "frames": submission.frames,
-        "asked_by": submission.origin.asked_by,
-        "address": submission.origin.address,
-        "request_id": submission.origin.request_id,
-        "traceparent": submission.origin.traceparent,
+        **asdict(submission.origin),
         "created_at": now,
         "updated_at": now,
     }

@@ -64,40 +64,26 @@ class JobOutcome:
 
     def tallies(self) -> Increments:
         """Return the increments of the counters."""
-        restarts: Increments = {} if self.started_at is None else {(RESTARTS, ()): self.attempts - 1}
+        parts: list[Increments] = []
+        if self.started_at is not None:
+            parts.append({(RESTARTS, ()): self.attempts - 1})
+        timings = {} if self.result is None else self.result.timings_s
+        parts += [STAGE.of(timings[stage], stage) for stage in STAGES if stage in timings]
         if self.kind != "calibration":
-            return total([{(OTHERS_ENDED, (self.kind, self.status)): 1}, restarts, *self._stages()])
-        ended: Increments = {(ENDED, self._outcome()): 1}
-        return total([ended, restarts, *self._course(), *self._stages(), *self._quality(), *self._views()])
-
-    def _outcome(self) -> tuple[str, str, str]:
-        verdict = self.result.verdict if isinstance(self.result, Result) else ""
-        return self.status, verdict, "" if self.error is None else _kind(self.error)
-
-    def _course(self) -> list[Increments]:
-        if self.started_at is None:
-            return []
-        # A clock can be set back, and another server can take over from the database's.
-        waited = WAIT.of(max(0.0, (self.started_at - self.created_at).total_seconds()))
-        took = DURATION.of(max(0.0, (self.finished_at - self.started_at).total_seconds()))
-        return [waited, took]
-
-    def _stages(self) -> list[Increments]:
-        if self.result is None:
-            return []
-        timings = self.result.timings_s
-        return [STAGE.of(timings[stage], stage) for stage in STAGES if stage in timings]
-
-    def _quality(self) -> list[Increments]:
-        if not isinstance(self.result, Result) or self.result.stitch_error_px is None:
-            return []
-        return [STITCH_ERROR.of(self.result.stitch_error_px)]
-
-    def _views(self) -> list[Increments]:
-        if not isinstance(self.result, Result):
-            return []
-        views = [camera.view for camera in self.result.cameras if camera.view is not None]
-        return [{(VIEWS, (view.cause or USABLE,)): 1} for view in views]
+            return total([{(OTHERS_ENDED, (self.kind, self.status)): 1}, *parts])
+        if self.started_at is not None:
+            # A clock can be set back, and another server can take over from the database's.
+            parts.append(WAIT.of(max(0.0, (self.started_at - self.created_at).total_seconds())))
+            parts.append(DURATION.of(max(0.0, (self.finished_at - self.started_at).total_seconds())))
+        verdict = ""
+        if isinstance(self.result, Result):
+            verdict = self.result.verdict
+            views = [camera.view for camera in self.result.cameras if camera.view is not None]
+            parts += [{(VIEWS, (view.cause or USABLE,)): 1} for view in views]
+            if self.result.stitch_error_px is not None:
+                parts.append(STITCH_ERROR.of(self.result.stitch_error_px))
+        error = "" if self.error is None else _kind(self.error)
+        return total([{(ENDED, (self.status, verdict, error)): 1}, *parts])
 
 
 def _kind(error: JobError) -> str:
