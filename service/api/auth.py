@@ -159,7 +159,8 @@ class Authenticator:
         hash_ = hash_of(given.strip())
         cached = self._cached_keys.get(hash_)
         if cached is None:
-            key = await self._find_new(hash_, address)
+            # A key that was never seen before may be a guess.
+            key = await self._guessed(address, lambda: self._find(hash_, address))
         elif cached.until <= self._clock():
             key = await self._find(hash_, address)
         else:
@@ -197,10 +198,6 @@ class Authenticator:
             raise _session_over()
         self._cached_sessions[hash_] = _CachedKey(key, until)
         return key
-
-    async def _find_new(self, hash_: str, address: str) -> Key:
-        """Look up a key that was never seen before, as often as guesses from its address are allowed."""
-        return await self._guessed(address, lambda: self._find(hash_, address))
 
     async def _guessed(self, address: str, find: Callable[[], Awaitable[Key]]) -> Key:
         """Return the key that `find` finds, unless too much was guessed from this address."""

@@ -178,11 +178,9 @@ class LiveMinuteCamera(Schema):
         turns = [turn for turn in (self.turned_deg, camera.turned_deg) if turn is not None]
         latencies = [latency for latency in (self.latency_ms, camera.latency_ms) if latency is not None]
         worst = {name: max(getattr(latency, name) for latency in latencies) for name in ("p50", "p99") if latencies}
+        counts = ("pictures", "measured", "coasted", "refused")
         return LiveMinuteCamera(
-            pictures=self.pictures + camera.pictures,
-            measured=self.measured + camera.measured,
-            coasted=self.coasted + camera.coasted,
-            refused=self.refused + camera.refused,
+            **{name: getattr(self, name) + getattr(camera, name) for name in counts},
             turned_deg=max(turns, default=None),
             latency_ms=LatencyMs(**worst) if worst else None,
         )

@@ -109,11 +109,16 @@ def _keep_newest(connection: sa.Connection, venue_id: str, report: LiveReport, n
     before = None if row is None else live_alarms.watch_in(row)
     watch = live_alarms.watch_after(before, report, now)
     cameras = [LiveCamera.from_input(camera) for camera in report.cameras]
-    watched, beside = live_alarms.watched_columns(watch)
+    newest, *others = watch.senders
     values = {
         "reported_at": now,
-        "document": to_document(report) | {"cameras": [to_document(camera) for camera in cameras]} | beside,
-        "watched": watched,
+        "document": {
+            **to_document(report),
+            "cameras": [to_document(camera) for camera in cameras],
+            "first_at": to_document(newest)["first_at"],
+            live_alarms.OTHERS: [to_document(one) for one in others],
+        },
+        "watched": {camera: to_document(one) for camera, one in newest.cameras.items()},
         "alarm_due_at": live_alarms.due_after(before, None if row is None else row.alarm_due_at, watch, now),
     }
     if row is None:

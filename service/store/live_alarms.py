@@ -15,7 +15,6 @@ from service.schemas.base import TOLERANTLY, Schema
 from service.schemas.health import AlarmRule
 from service.schemas.live import LiveCameraIn, LiveReport
 from service.store import tables
-from service.store.documents import to_document
 from service.store.unreadable import read_or
 
 NOT_MEASURED_FOR, LATE_FOR, SILENT_FOR = timedelta(seconds=10), timedelta(minutes=1), timedelta(seconds=30)
@@ -163,13 +162,6 @@ def _is_to_be_kept(other: WatchedSender, newest: WatchedSender) -> bool:
     # It may run as well and only report after one that has just begun, or may have ended before that.
     overlaps = other.reported_at >= newest.first_at
     return silent_for < (FORGOTTEN_AFTER if overlaps else SILENT_FOR)
-
-
-def watched_columns(watch: LiveWatch) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return what a row of `live_reports` keeps of it: the column `watched`, and what is added to `document`."""
-    newest, *others = watch.senders
-    cameras = {camera: to_document(one) for camera, one in newest.cameras.items()}
-    return cameras, {"first_at": to_document(newest)["first_at"], OTHERS: [to_document(one) for one in others]}
 
 
 def due_after(before: LiveWatch | None, due_at: datetime | None, after: LiveWatch, now: datetime) -> datetime | None:
