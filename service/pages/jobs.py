@@ -10,7 +10,7 @@ from service.pages.page_rendering import Page, render_page
 from service.pages.venues import sizes_of
 from service.routes.contract.attribution import hide_other_asker
 from service.routes.contract.documented import needs_scope
-from service.routes.contract.restricted import OnlyVenues, lists_by_venue
+from service.routes.contract.restricted import OnlyVenues
 from service.schemas.job import Job, newest_failed
 from service.schemas.names import ID_PATTERN, JOB_ID_PATTERN, FormatName, JobKind, JobStatus
 from service.schemas.problems import Problem
@@ -25,7 +25,6 @@ router = APIRouter(prefix="/ui/jobs", route_class=Page, include_in_schema=False)
 
 
 @router.get("", openapi_extra=needs_scope("read"))
-@lists_by_venue
 def jobs(
     request: Request,
     context: InContext,

@@ -16,7 +16,7 @@ from service.pages.sparkline import Sparkline, sparkline
 from service.routes.contract.attribution import hide_other_actor
 from service.routes.contract.documented import needs_scope
 from service.routes.contract.guarded import Guarded
-from service.routes.contract.restricted import OnlyVenues, lists_by_venue
+from service.routes.contract.restricted import OnlyVenues
 from service.routes.venues import existing_venue
 from service.schemas import etags
 from service.schemas.health import Alarm, VenueHealth
@@ -63,7 +63,6 @@ class VenueRow:
 
 
 @router.get("/", openapi_extra=needs_scope("read"))
-@lists_by_venue
 def venues(
     request: Request,
     context: InContext,

@@ -17,7 +17,7 @@ from service.routes.contract.exported import DOCUMENTS, ExportQuery, FormatQuery
 from service.routes.contract.guarded import Guarded
 from service.routes.contract.paged import CURSOR, LIMIT, NEXT_PAGE, next_page
 from service.routes.contract.problem_docs import OF_EXPORTS, problem_responses
-from service.routes.contract.restricted import OnlyVenues, lists_by_venue
+from service.routes.contract.restricted import OnlyVenues
 from service.routes.contract.tagged import TAGGED, IfNoneMatch, tagged_json
 from service.schemas.job import Job, Jobs
 from service.schemas.names import ID_PATTERN, JOB_ID_PATTERN, OPEN_STATUSES, JobKind, JobStatus, ListFields
@@ -77,7 +77,6 @@ ExistingState = Annotated[JobState, Depends(_existing_state)]
 
 
 @router.get("", openapi_extra=needs_scope("read"), responses={200: {"headers": NEXT_PAGE}})
-@lists_by_venue
 def list_jobs(
     context: InContext,
     only: OnlyVenues,

@@ -17,7 +17,7 @@ from service.routes.contract.exported import DOCUMENTS, ExportQuery, FormatQuery
 from service.routes.contract.guarded import Guarded
 from service.routes.contract.paged import CURSOR, LIMIT, NEXT_PAGE, next_page
 from service.routes.contract.problem_docs import OF_EXPORTS, problem_responses
-from service.routes.contract.restricted import OnlyVenues, lists_by_venue
+from service.routes.contract.restricted import OnlyVenues
 from service.routes.contract.tagged import TAGGED, IfNoneMatch, tagged_json
 from service.schemas import etags
 from service.schemas.base import Day, Name
@@ -140,7 +140,6 @@ def patch_venue(
 
 
 @router.get("", openapi_extra=needs_scope("read"), responses={200: {"headers": NEXT_PAGE}})
-@lists_by_venue
 def list_venues(
     context: InContext,
     only: OnlyVenues,

@@ -33,7 +33,7 @@ class Guarded(APIRoute):
         """Return the handler of the route behind the checks."""
         handle, needed = super().get_route_handler(), self.needed
         takes_document = self.body_field is not None
-        lists = restricted.is_list(self.endpoint)
+        lists = restricted.is_list(self)
         if needed is None:
             return handle
 

@@ -5,10 +5,10 @@ All other routes are closed to them, also those that are added later. A venue th
 answered with 403: the OpenAPI document shows to everybody that it exists.
 """
 
-from collections.abc import Callable
-from typing import Annotated, Any, TypeVar
+from typing import Annotated
 
 from fastapi import Depends, Request
+from fastapi.routing import APIRoute
 from starlette.concurrency import run_in_threadpool
 
 from service.api.context import Context
@@ -16,28 +16,19 @@ from service.schemas.problems import Problem
 from service.store.keys import Key
 from service.store.refusals import no_such_job
 
-Endpoint = TypeVar("Endpoint", bound=Callable[..., Any])
-LISTS = "lists_by_venue"
-
-
-def lists_by_venue(endpoint: Endpoint) -> Endpoint:
-    """Mark a route that lists all venues, and leaves out those that `OnlyVenues` does not name."""
-    setattr(endpoint, LISTS, True)
-    return endpoint
-
-
-def is_list(endpoint: Callable[..., Any]) -> bool:
-    """True if a route is marked by `lists_by_venue`."""
-    return getattr(endpoint, LISTS, False)
-
 
 async def _only_venues(request: Request) -> frozenset[str] | None:
     key: Key | None = getattr(request.state, "key", None)
     return None if key is None else key.venues
 
 
-# The venues that the caller may know of; None: all.
+# The venues that the caller may know of; None: all. A route that takes them is a list, and leaves out all others.
 OnlyVenues = Annotated[frozenset[str] | None, Depends(_only_venues)]
+
+
+def is_list(route: APIRoute) -> bool:
+    """True if a route lists venues, or what belongs to them, by `OnlyVenues`."""
+    return any(dependency.call is _only_venues for dependency in route.dependant.dependencies)
 
 
 async def check(request: Request, key: Key, *, lists: bool) -> None:
