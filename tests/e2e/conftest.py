@@ -15,6 +15,7 @@ from service.settings import MODEL_BESIDE_THE_CODE
 from testbed import disks
 from testbed.disks import may_mount
 from testbed.homes import environment
+from testbed.network_cameras import NetworkCamera
 from testbed.running import Service, png
 from tests.e2e.commands import esc_here
 
@@ -90,6 +91,14 @@ def unusual(tmp_path_factory):
     running = Service(tmp_path_factory.mktemp("unusual"), "serve", **FROM_HERE | settings)
     yield running
     assert running.stop() == 0
+
+
+@pytest.fixture(scope="module")
+def camera():
+    """A network camera on a real socket."""
+    camera = NetworkCamera()
+    yield camera
+    camera.close()
 
 
 @pytest.fixture

@@ -10,7 +10,6 @@ from subprocess import PIPE
 import pytest
 
 from testbed import warm
-from testbed.network_cameras import NetworkCamera
 from testbed.running import venue
 
 # The SDK loads for seconds, in a process for each assistant.
@@ -65,13 +64,6 @@ def storing(service_of_a_folder):
     """An assistant whose operator allows it to store."""
     with assistant(service_of_a_folder, "--allow-storing") as one:
         yield one
-
-
-@pytest.fixture(scope="module")
-def camera():
-    camera = NetworkCamera()
-    yield camera
-    camera.close()
 
 
 def put(service, camera, name, behaviour):

@@ -13,7 +13,6 @@ import paho.mqtt.client as paho
 import pytest
 
 from testbed import warm
-from testbed.network_cameras import NetworkCamera
 from testbed.ports import free_port
 from testbed.running import venue, wait_for
 from tests.e2e.conftest import FROM_HERE, shared
@@ -126,13 +125,6 @@ def mqtt(service, url, *arguments, **environment):
 def bridge(service, broker, name):
     with mqtt(service, f"mqtt://{USER}@127.0.0.1:{broker.port}", "--topic", name) as process:
         yield process
-
-
-@pytest.fixture(scope="module")
-def camera():
-    camera = NetworkCamera()
-    yield camera
-    camera.close()
 
 
 def put(service, name, behaviour, **more):

@@ -6,19 +6,11 @@ from datetime import UTC, datetime, timedelta
 import pytest
 
 from testbed.clocks import Clock
-from testbed.network_cameras import NetworkCamera
 from testbed.running import Service, venue, wait_for
 
 AHEAD_S = 6 * 3600
 # Every quarter of an hour, and venues of one schedule are spread over another.
 LATEST = timedelta(minutes=31)
-
-
-@pytest.fixture
-def camera():
-    camera = NetworkCamera()
-    yield camera
-    camera.close()
 
 
 @pytest.fixture

@@ -12,19 +12,11 @@ import sqlalchemy as sa
 
 from service.store import tables
 from testbed.homes import in_both_homes
-from testbed.network_cameras import NetworkCamera
 from testbed.running import upload, venue, wait_for
 
 LIMIT, CLIENTS, JOB_S = 2, 4, 0.5
 # Until a place is free, frames are fetched by a process of their own, and the worker looks, on a busy machine.
 TURN_S = 30.0
-
-
-@pytest.fixture
-def camera():
-    camera = NetworkCamera()
-    yield camera
-    camera.close()
 
 
 def push(service, name, until, answers):
