@@ -15,6 +15,7 @@ from service.routes.contract.guarded import Guarded
 from service.settings import Settings
 from testbed.running import Service, keys_in, png, upload, venue, wait_for
 from tests.e2e.commands import esc_here, esc_process
+from tests.problems import problem_of
 from tools.openapi import document
 
 SCOPES = ("read", "calibrate", "admin")
@@ -179,9 +180,9 @@ def test_refusals_are_problems_that_name_the_way_in(guarded, key):
     assert (missing.headers["www-authenticate"], missing.json()["type"]) == ("Bearer", "/problems/key-missing")
     unknown = guarded.http.get("/jobs", headers=bearer("esc_unknown"))
     assert unknown.headers["www-authenticate"] == 'Bearer error="invalid_token"'
-    assert (unknown.status_code, unknown.json()["type"]) == (401, "/problems/key-unknown")
+    assert problem_of(unknown) == (401, "key-unknown")
     small = guarded.http.put("/venues/v", json=venue("v"), headers=bearer(key["calibrate"]))
-    assert (small.status_code, small.json()["type"]) == (403, "/problems/scope-too-small")
+    assert problem_of(small) == (403, "scope-too-small")
     assert (small.json()["expected"], small.json()["got"]) == ("admin", "calibrate")
 
 
@@ -335,7 +336,7 @@ def test_a_service_without_keys_answers_to_its_own_names(open_to_all, host):
 )
 def test_and_to_no_other_name_that_was_made_to_point_to_it(open_to_all, host):
     answer = open_to_all.http.get("/jobs", headers={"Host": host})
-    assert (answer.status_code, answer.json()["type"]) == (421, "/problems/host-unknown")
+    assert problem_of(answer) == (421, "host-unknown")
     assert "ESC_ALLOWED_HOSTS" in answer.json()["detail"]
 
 
@@ -343,7 +344,7 @@ def test_and_to_no_other_name_that_was_made_to_point_to_it(open_to_all, host):
 def test_pages_of_other_origins_change_nothing(open_to_all, origin):
     for method, path in (("PUT", "/venues/v"), ("DELETE", "/venues/v"), ("POST", "/venues/v/calibrate")):
         answer = open_to_all.http.request(method, path, headers={"Origin": origin})
-        assert (answer.status_code, answer.json()["type"]) == (403, "/problems/origin-foreign")
+        assert problem_of(answer) == (403, "origin-foreign")
 
 
 def test_pages_of_the_service_may(open_to_all):

@@ -12,15 +12,8 @@ from service.intake.snapshots import STARTING_S, Snapshots
 from service.schemas.venue import VenueIn
 from service.settings import Settings
 from service.store import tables
-from testbed.network_cameras import NetworkCamera
 from testbed.running import png, upload, venue, wait_for
-
-
-@pytest.fixture(scope="module")
-def camera():
-    camera = NetworkCamera()
-    yield camera
-    camera.close()
+from tests.problems import problem_of
 
 
 def with_sources(name: str, **sources: str) -> dict:
@@ -122,7 +115,7 @@ def test_a_password_among_the_parameters_is_shown_to_nobody_and_still_reaches_th
 def test_a_parameter_that_nobody_knows_is_refused_by_its_name(service, camera, name):
     document = with_sources(name, left=camera.url("/snap?token=***"))
     refused = service.http.put(f"/venues/{name}", json=document)
-    assert (refused.status_code, refused.json()["type"]) == (422, "/problems/source-refused")
+    assert problem_of(refused) == (422, "source-refused")
     assert "`token`" in refused.json()["detail"]
 
 
@@ -136,7 +129,7 @@ def test_a_password_does_not_follow_a_source_to_another_host(service, camera, na
     shown = put(service, name, left=camera.url("/basic", "user:pass%20word@"), right=camera.url("/ok"))
     shown["cameras"][0]["source"] = "http://***@127.0.0.2/basic"
     refused = service.http.put(f"/venues/{name}", json=sent_again(shown))
-    assert (refused.status_code, refused.json()["type"]) == (422, "/problems/source-refused")
+    assert problem_of(refused) == (422, "source-refused")
 
 
 @pytest.mark.parametrize(
@@ -199,7 +192,7 @@ def test_hosts_that_are_not_named_are_refused(service, name, host):
 @pytest.mark.parametrize("url", ["ftp://127.0.0.1/x", "http://", "file:///etc/passwd", "http://127.0.0.1:x/", "x"])
 def test_an_address_that_is_no_source_is_refused(service, name, url):
     answer = service.http.put(f"/venues/{name}", json=with_sources(name, left=url))
-    assert (answer.status_code, answer.json()["type"]) == (422, "/problems/invalid-request")
+    assert problem_of(answer) == (422, "invalid-request")
 
 
 def test_moving_a_source_does_not_disturb_a_calibration(service, camera, name):

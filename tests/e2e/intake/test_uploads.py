@@ -15,6 +15,7 @@ import pytest
 
 from testbed.parameters import try_first
 from testbed.running import SIZE, png, png_of, upload, wait_for
+from tests.problems import problem_of
 
 
 @pytest.fixture
@@ -97,20 +98,20 @@ def test_a_wrong_size_says_what_was_expected_and_what_came(send):
 def test_a_frame_may_have_as_many_bytes_as_the_setting_says(unusual, name):
     unusual.venue(name)
     too_large = unusual.http.post(f"/venues/{name}/calibrate", files=[("left", ("l", jpeg())), *upload()[1:]])
-    assert (too_large.status_code, too_large.json()["type"]) == (413, "/problems/frame-too-large")
+    assert problem_of(too_large) == (413, "frame-too-large")
     body = unusual.http.post(f"/venues/{name}/calibrate", files=[("left", ("l", bytes(50_000)))])
-    assert (body.status_code, body.json()["type"]) == (413, "/problems/body-too-large")
+    assert problem_of(body) == (413, "body-too-large")
 
     def chunks():
         yield from [bytes(1000)] * 50
 
     chunked = unusual.http.put(f"/venues/{name}", content=chunks(), headers={"Content-Type": "application/json"})
-    assert (chunked.status_code, chunked.json()["type"]) == (413, "/problems/body-too-large")
+    assert problem_of(chunked) == (413, "body-too-large")
 
 
 def test_a_missing_camera_is_named(service, stadium):
     answer = service.http.post(f"/venues/{stadium}/calibrate", files=upload(cameras=("left",)))
-    assert (answer.status_code, answer.json()["type"]) == (422, "/problems/missing-camera")
+    assert problem_of(answer) == (422, "missing-camera")
     assert answer.json()["camera"] == "right"
 
 
@@ -124,12 +125,12 @@ def test_an_unknown_camera_is_named(service, stadium, camera):
 
 def test_too_many_frames_of_a_camera_are_refused(service, stadium):
     answer = service.http.post(f"/venues/{stadium}/calibrate", files=[upload()[1]] + [upload()[0]] * 17)
-    assert (answer.status_code, answer.json()["type"]) == (422, "/problems/too-many-frames")
+    assert problem_of(answer) == (422, "too-many-frames")
 
 
 def test_a_frame_that_is_no_file_is_refused(service, stadium):
     answer = service.http.post(f"/venues/{stadium}/calibrate", files=[*upload()[1:], ("left", (None, "left.jpg"))])
-    assert (answer.status_code, answer.json()["type"]) == (422, "/problems/not-a-file")
+    assert problem_of(answer) == (422, "not-a-file")
 
 
 @pytest.mark.parametrize("file_name", ["../../../../etc/cron.d/x", "/etc/passwd", "a\\b\\c", "x" * 500, "\u202e.png"])
@@ -165,7 +166,7 @@ def test_the_name_of_a_file_means_nothing(send, service, file_name):
 )
 def test_garbage_in_the_options_is_refused(service, stadium, options):
     answer = service.http.post(f"/venues/{stadium}/calibrate", files=[*upload(), ("options", (None, options))])
-    assert (answer.status_code, answer.json()["type"]) == (422, "/problems/invalid-request")
+    assert problem_of(answer) == (422, "invalid-request")
 
 
 def test_options_may_come_as_a_file_but_once(service, stadium):
@@ -190,7 +191,7 @@ def test_what_is_no_form_is_refused(service, stadium):
 
 def test_frames_for_no_venue_are_refused(service):
     answer = service.http.post("/venues/nowhere/calibrate", files=upload())
-    assert (answer.status_code, answer.json()["type"]) == (404, "/problems/venue-not-found")
+    assert problem_of(answer) == (404, "venue-not-found")
 
 
 def test_refused_frames_leave_nothing_behind(service, send):

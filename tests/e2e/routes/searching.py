@@ -35,11 +35,6 @@ def adopt(service, name, job, headers=None, **candidates):
     )
 
 
-def refused(answer):
-    assert answer.headers["content-type"] == "application/problem+json"
-    return answer.status_code, answer.json()["type"].removeprefix("/problems/")
-
-
 def depth(stored, camera):
     """How far in front of the pitch a camera stands, m: 40 is the first candidate, 60 the second, 50 none of them."""
     return -next(one for one in stored["cameras"] if one["id"] == camera)["pose"]["position"][1]

@@ -16,6 +16,7 @@ from testbed import rendered_pair
 from testbed.boards import board_places
 from testbed.running import png
 from tests.e2e.commands import esc_here
+from tests.problems import problem_of
 from tests.service.cli.test_check import records
 from tests.worker.calibration.onboarding.test_first_pose import CAMERA, LENS, SIZE, clicks
 from tests.worker.calibration.onboarding.test_lens_calibration import BOARD
@@ -168,7 +169,7 @@ def test_what_is_wrong_with_a_request_is_said_at_once(service, name):
     )
     assert locate(service, name, points()[:3]).status_code == 422
     small = locate(service, name, points(), files=[("left", ("left.png", png(64, 48)))])
-    assert (small.status_code, small.json()["type"]) == (422, "/problems/frame-size")
+    assert problem_of(small) == (422, "frame-size")
     other = locate(service, name, points(), files=[("right", ("right.png", png(*SIZE)))])
     assert other.json()["type"] == "/problems/unknown-camera"
 

@@ -5,6 +5,7 @@ import json
 import pytest
 
 from testbed.running import FRAMES, upload
+from tests.problems import problem_of
 
 
 def fit(service, name, options=None, headers=None, files=None):
@@ -40,15 +41,10 @@ def test_a_key_is_one_fit_and_a_calibration_of_the_same_frames_needs_its_own(ser
 
 def test_what_is_wrong_with_a_request_is_said_at_once(service, name):
     service.venue(name)
-
-    def refused(answer):
-        assert answer.headers["content-type"] == "application/problem+json"
-        return answer.status_code, answer.json()["type"]
-
-    assert refused(fit(service, f"{name}-not")) == (404, "/problems/venue-not-found")
-    assert refused(fit(service, name, files=upload()[:1])) == (422, "/problems/missing-camera")
-    assert refused(fit(service, name, {"colour": "red"})) == (422, "/problems/invalid-request")
-    assert refused(service.http.post(f"/venues/{name}/field/fit", json={})) == (415, "/problems/not-multipart")
+    assert problem_of(fit(service, f"{name}-not")) == (404, "venue-not-found")
+    assert problem_of(fit(service, name, files=upload()[:1])) == (422, "missing-camera")
+    assert problem_of(fit(service, name, {"colour": "red"})) == (422, "invalid-request")
+    assert problem_of(service.http.post(f"/venues/{name}/field/fit", json={})) == (415, "not-multipart")
 
 
 @pytest.mark.parametrize(("behaviour", "code"), [("accept", 0), ("fail", 1), ("reject", 3)])

@@ -20,6 +20,7 @@ from service.store.venues import VenueRepository
 from testbed.homes import in_both_homes, in_one_home_first
 from testbed.running import DEADLINE_S, SIZE, Service, venue, wait_for
 from tests.e2e.routes.event_stream import followed
+from tests.problems import problem_of
 from tests.worker.receiver import LOCAL, SECRET, Receiver
 
 EXAMPLES = Path(__file__).parents[3] / "docs" / "examples"
@@ -165,7 +166,7 @@ def test_a_webhook_of_a_venue_gets_the_new_poses_signed(start):
 
 def test_a_webhook_that_could_not_be_told_is_refused(service, name):
     refused = service.http.put(f"/venues/{name}", json=venue(name) | {"webhooks": [{"url": "https://a.example"}]})
-    assert (refused.status_code, refused.json()["type"]) == (422, "/problems/callback-refused")
+    assert problem_of(refused) == (422, "callback-refused")
     assert refused.json()["detail"].startswith("webhooks: ")
     unknown = {"url": "https://a.example", "events": ["poses.*"]}
     assert service.http.put(f"/venues/{name}", json=venue(name) | {"webhooks": [unknown]}).status_code == 422
@@ -203,7 +204,7 @@ def test_an_address_that_is_shown_of_another_venue_is_refused(start):
     service.http.put("/venues/v", json=venue("v") | {"webhooks": [{"url": SLACK}]}).raise_for_status()
     webhooks = service.http.get("/venues/v").json()["webhooks"]
     refused = service.http.put("/venues/w", json=venue("w") | {"webhooks": webhooks})
-    assert (refused.status_code, refused.json()["type"]) == (422, "/problems/callback-refused")
+    assert problem_of(refused) == (422, "callback-refused")
     assert "send the address itself" in refused.json()["detail"]
 
 

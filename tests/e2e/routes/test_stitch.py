@@ -8,6 +8,8 @@ import cv2
 import numpy as np
 import pytest
 
+from tests.problems import problem_of
+
 SMALL = {"projection": "cylinder", "width_px": 320, "height_px": 120}
 
 
@@ -88,13 +90,13 @@ def test_the_view_is_the_venues_unless_a_request_has_it_otherwise(service, name)
 def test_a_view_that_no_picture_can_have_is_refused(service, name, params):
     service.venue(name)
     answer = stitch(service, name, **params)
-    assert (answer.status_code, answer.json()["type"]) == (422, "/problems/invalid-request")
+    assert problem_of(answer) == (422, "invalid-request")
 
 
 def test_a_view_of_too_many_pixels_is_refused_with_what_helps(service, name):
     service.venue(name)
     answer = stitch(service, name, width_px=8192, height_px=8192)
-    assert (answer.status_code, answer.json()["type"]) == (422, "/problems/view-too-large")
+    assert problem_of(answer) == (422, "view-too-large")
     assert answer.json()["detail"] == "2 cameras in 8192x8192 pixels are too much: ask for fewer pixels."
 
 
@@ -106,7 +108,7 @@ def preview(service, name, tag=None, **params):
 def test_a_preview_shows_the_frames_of_the_last_calibration(service, name):
     service.venue(name)
     none = preview(service, name)
-    assert (none.status_code, none.json()["type"]) == (404, "/problems/no-frames")
+    assert problem_of(none) == (404, "no-frames")
     service.calibrated(name, shade=200)
     shown = preview(service, name)
     picture = cv2.imdecode(np.frombuffer(shown.content, np.uint8), cv2.IMREAD_COLOR)

@@ -12,6 +12,7 @@ from service.settings import Settings
 from service.store import tables
 from testbed.running import wait_for
 from tests.e2e.commands import esc_here
+from tests.problems import problem_of
 from tests.worker.receiver import LOCAL, SECRET, Holding
 from worker.duties import webhook_request
 
@@ -65,10 +66,10 @@ def test_an_end_that_no_worker_saw_is_told_by_the_next_one(start, receiver, work
 
 def test_without_a_secret_a_callback_is_refused_with_what_to_do(service, name):
     answer = service.submit(service.venue(name), callback_url="https://example.com/told")
-    assert (answer.status_code, answer.json()["type"]) == (422, "/problems/callback-refused")
+    assert problem_of(answer) == (422, "callback-refused")
     assert "ESC_WEBHOOK_SECRET" in answer.json()["detail"]
     nonsense = service.submit(name, callback_url="told")
-    assert (nonsense.status_code, nonsense.json()["type"]) == (422, "/problems/invalid-request")
+    assert problem_of(nonsense) == (422, "invalid-request")
     assert nonsense.json()["errors"][0]["where"] == "options.callback_url"
 
 

@@ -9,6 +9,7 @@ from service.store.blobs import Blobs
 from testbed.books import queued
 from testbed.homes import in_one_home_first
 from testbed.running import Service, wait_for
+from tests.problems import problem_of
 
 
 def age(service, job: str, days: float) -> None:
@@ -39,7 +40,7 @@ def test_a_job_that_is_deleted_takes_its_frames_and_pictures_with_it(service, na
 def test_a_job_that_is_open_is_cancelled_before_it_is_deleted(service, esc, name):
     job = service.submitted(service.venue(name, "hang"))
     refused = service.http.delete(f"/jobs/{job}")
-    assert (refused.status_code, refused.json()["type"]) == (409, "/problems/job-open")
+    assert problem_of(refused) == (409, "job-open")
     assert esc("job", "delete", job, "--yes").returncode == 1
     service.http.post(f"/jobs/{job}/cancel")
     assert esc("job", "delete", job, "--yes").returncode == 0
@@ -57,7 +58,7 @@ def test_what_is_past_its_time_goes_and_says_so(start):
     age(service, old, days=15)
     wait_for(lambda: not service.files(f"pictures/{old}") and not service.files(f"frames/{old}"))
     answer = service.http.get(f"/jobs/{old}/birdseye.jpg")
-    assert (answer.status_code, answer.json()["type"]) == (410, "/problems/picture-deleted")
+    assert problem_of(answer) == (410, "picture-deleted")
     assert "14 days" in answer.json()["detail"]
     assert service.job(old)["result"]["rejected_because"] == "the lines do not fit"
     assert "birdseye" not in service.job(old)["links"]
@@ -82,16 +83,16 @@ def test_a_picture_that_somebody_else_deleted_is_told_from_one_that_never_was(se
     for kind in ("frames", "pictures"):
         blobs.delete_under(f"{kind}/{job}")
     gone = service.http.get(f"/jobs/{job}/birdseye.jpg")
-    assert (gone.status_code, gone.json()["type"]) == (410, "/problems/picture-deleted")
+    assert problem_of(gone) == (410, "picture-deleted")
     never = service.http.get(f"/jobs/{job}/overlay/middle.jpg")
-    assert (never.status_code, never.json()["type"]) == (404, "/problems/picture-not-found")
+    assert problem_of(never) == (404, "picture-not-found")
 
 
 def test_a_nearly_full_disk_refuses_uploads_and_says_what_to_do(service, name):
     running = service.submitted(service.venue(name, "accept 2"))
     tight = Service(service.data, "serve", ESC_MIN_FREE_MB="1e9")
     answer = tight.submit(name, 1)
-    assert (answer.status_code, answer.json()["type"]) == (507, "/problems/disk-full")
+    assert problem_of(answer) == (507, "disk-full")
     assert "ESC_KEEP_FRAMES_DAYS" in answer.json()["detail"]
     ready = tight.http.get("/readyz")
     assert ready.status_code == 200

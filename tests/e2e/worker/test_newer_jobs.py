@@ -8,6 +8,7 @@ from testbed.homes import in_one_home_first
 from testbed.parameters import try_first
 from testbed.running import wait_for
 from tests.e2e.observe.figures import families
+from tests.problems import problem_of
 
 j = tables.jobs.c
 
@@ -75,7 +76,7 @@ def test_a_job_that_no_worker_can_read_can_be_cancelled_and_its_frames_are_not_s
     assert service.http.post(f"/jobs/{job}/cancel").json()["status"] == "cancelled"
     changed(service, job, kind="calibration")
     answer = service.http.post(f"/jobs/{job}/again")
-    assert (answer.status_code, answer.json()["type"]) == (409, "/problems/job-of-newer-version")
+    assert problem_of(answer) == (409, "job-of-newer-version")
     assert "zoom" in answer.json()["detail"]
 
 

@@ -8,6 +8,7 @@ from fastapi import FastAPI, Request
 
 from service.api import problems
 from service.api.body_limit import LARGEST_DOCUMENT, BodyLimit
+from tests.problems import problem_of
 
 LARGEST_FORM = 3_000_000
 LARGEST = {
@@ -48,5 +49,5 @@ async def pieces(size):
 def test_a_body_may_be_as_large_as_its_kind(post, content_type, largest, chunked):
     assert post(largest, content_type, chunked).json() == largest
     refused = post(largest + 1, content_type, chunked)
-    assert (refused.status_code, refused.json()["type"]) == (413, "/problems/body-too-large")
+    assert problem_of(refused) == (413, "body-too-large")
     assert f"{largest} bytes are allowed" in refused.json()["detail"]

@@ -1,6 +1,7 @@
 """A job's frames once more."""
 
 from testbed.running import venue
+from tests.problems import problem_of
 from tests.service.routes.test_find import forget_frames
 
 
@@ -26,7 +27,7 @@ def test_frames_that_are_gone_are_asked_for_again(service, name):
     job = service.calibrated(service.venue(name))
     forget_frames(service, job)
     answer = service.http.post(f"/jobs/{job['id']}/again")
-    assert (answer.status_code, answer.json()["type"]) == (410, "/problems/frames-deleted")
+    assert problem_of(answer) == (410, "frames-deleted")
 
 
 def test_frames_of_a_venue_that_was_changed_are_those_of_another(service, name):
@@ -34,6 +35,6 @@ def test_frames_of_a_venue_that_was_changed_are_those_of_another(service, name):
     changed = venue(name) | {"field": {"length_m": 100, "width_m": 68}}
     service.http.put(f"/venues/{name}", json=changed).raise_for_status()
     answer = service.http.post(f"/jobs/{job}/again")
-    assert (answer.status_code, answer.json()["type"]) == (409, "/problems/venue-replaced")
+    assert problem_of(answer) == (409, "venue-replaced")
     service.http.delete(f"/venues/{name}")
     assert service.http.post(f"/jobs/{job}/again").status_code == 404

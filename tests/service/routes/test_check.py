@@ -10,7 +10,7 @@ from service.formats.conversion import members_of, write_cameras
 from service.formats.records import CameraRecord
 from service.schemas.geometry import Intrinsics, Pose
 from testbed.running import png, upload
-from tests.e2e.routes.searching import refused
+from tests.problems import problem_of
 
 LENS = Intrinsics(matrix=[[60, 0, 32], [0, 60, 24], [0, 0, 1]], distortion=[])
 POSE = Pose.from_position([1.6, 0.1, -0.2], [-1.0, -50.0, 8.0])
@@ -60,9 +60,12 @@ def test_a_zip_is_unpacked_and_one_without_a_calibration_refused(service):
 
     answer = check(service, zipped(calibration("colmap", "left", "right")), upload(), **TENNIS)
     assert service.end(answer.json()["id"])["result"]["format"] == "colmap"
-    assert refused(check(service, zipped({"notes.pdf": b"%PDF"}), upload(), **TENNIS)) == (422, "calibration-refused")
+    assert problem_of(check(service, zipped({"notes.pdf": b"%PDF"}), upload(), **TENNIS)) == (
+        422,
+        "calibration-refused",
+    )
     bomb = zipped({"left.yml": bytes(9 << 20)})
-    assert refused(check(service, bomb, upload(), **TENNIS)) == (422, "calibration-refused")
+    assert problem_of(check(service, bomb, upload(), **TENNIS)) == (422, "calibration-refused")
 
 
 def test_the_only_camera_of_a_file_is_called_as_its_frame(service):
@@ -88,15 +91,15 @@ def test_a_check_is_run_again_with_its_frames(service):
 
 def test_what_cannot_be_checked_is_refused_with_what_was_expected(service):
     good = calibration("colmap", "left", "right")
-    assert refused(check(service, {}, upload(), **TENNIS)) == (422, "calibration-refused")
+    assert problem_of(check(service, {}, upload(), **TENNIS)) == (422, "calibration-refused")
     broken = check(service, {"calib.toml": b"[cam]\nname = 1"}, upload(), **TENNIS)
-    assert refused(broken) == (422, "calibration-refused")
+    assert problem_of(broken) == (422, "calibration-refused")
     assert "calib.toml" in broken.json()["detail"]
-    assert refused(check(service, good, [], **TENNIS)) == (422, "missing-camera")
-    assert refused(check(service, good, upload())) == (422, "invalid-request")
+    assert problem_of(check(service, good, [], **TENNIS)) == (422, "missing-camera")
+    assert problem_of(check(service, good, upload())) == (422, "invalid-request")
     unknown = check(service, good, [("top", ("top.png", png()))], **TENNIS)
-    assert refused(unknown) == (422, "unknown-camera")
+    assert problem_of(unknown) == (422, "unknown-camera")
     assert unknown.json()["expected"] == ["left", "right"]
-    assert refused(check(service, good, [("left", ("left.png", b"GIF89a"))], **TENNIS)) == (422, "not-an-image")
+    assert problem_of(check(service, good, [("left", ("left.png", b"GIF89a"))], **TENNIS)) == (422, "not-an-image")
     text = service.http.post("/check", files=[("calibration", (None, "x")), ("options", (None, json.dumps(TENNIS)))])
-    assert refused(text) == (422, "not-a-file")
+    assert problem_of(text) == (422, "not-a-file")

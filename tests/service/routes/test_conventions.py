@@ -4,6 +4,7 @@ import httpx
 import pytest
 
 from testbed.running import venue
+from tests.problems import problem_of
 
 
 def test_a_weak_tag_is_no_condition_for_a_change_and_one_for_a_read(service, name):
@@ -13,14 +14,14 @@ def test_a_weak_tag_is_no_condition_for_a_change_and_one_for_a_read(service, nam
     read = service.http.get(path, headers={"If-None-Match": f"W/{tag}"})
     assert read.status_code == 304
     refused = service.http.put(path, json=venue(name), headers={"If-Match": f"W/{tag}"})
-    assert (refused.status_code, refused.json()["type"]) == (412, "/problems/venue-changed")
+    assert problem_of(refused) == (412, "venue-changed")
     assert service.http.put(path, json=venue(name), headers={"If-Match": f'W/"x", {tag}'}).status_code == 200
 
 
 def test_a_patch_of_another_type_is_told_which_is_taken(service, name):
     service.venue(name)
     refused = service.http.patch(f"/venues/{name}", content=b"{}", headers={"Content-Type": "text/plain"})
-    assert (refused.status_code, refused.json()["type"]) == (415, "/problems/not-json")
+    assert problem_of(refused) == (415, "not-json")
     assert refused.headers["accept-patch"] == "application/merge-patch+json"
     assert "accept-patch" not in service.http.put(f"/venues/{name}", content=b"{}").headers
 

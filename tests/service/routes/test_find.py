@@ -4,7 +4,8 @@ import pytest
 
 from testbed.homes import in_both_homes, in_one_home_first
 from testbed.running import png, upload, venue
-from tests.e2e.routes.searching import adopt, depth, find, forget_frames, found, refused, site
+from tests.e2e.routes.searching import adopt, depth, find, forget_frames, found, site
+from tests.problems import problem_of
 
 
 def test_a_search_is_a_job_with_candidates_and_a_picture_of_each(service, name):
@@ -18,7 +19,7 @@ def test_a_search_is_a_job_with_candidates_and_a_picture_of_each(service, name):
     assert [len(camera["candidates"]) for camera in job["result"]["cameras"]] == [2, 2]
     assert job["links"]["candidate/left/2"] == f"/jobs/{job['id']}/candidate/left/2.jpg"
     assert service.http.get(job["links"]["candidate/left/2"]).headers["content-type"] == "image/jpeg"
-    assert refused(service.http.get(f"/jobs/{job['id']}/candidate/left/3.jpg")) == (404, "picture-not-found")
+    assert problem_of(service.http.get(f"/jobs/{job['id']}/candidate/left/3.jpg")) == (404, "picture-not-found")
 
 
 @in_both_homes
@@ -42,11 +43,11 @@ def test_a_search_stores_nothing_and_one_call_makes_the_venue_of_it(service, nam
 
 def test_of_a_camera_that_is_not_sure_a_person_chooses_a_candidate_or_leaves_it_out(service, name):
     job = found(service, name, place=site(name, "partly"))
-    assert refused(adopt(service, name, job)) == (409, "candidate-needed")
+    assert problem_of(adopt(service, name, job)) == (409, "candidate-needed")
     assert adopt(service, name, job).json()["expected"] == ["right"]
-    assert refused(adopt(service, name, job, right=3)) == (404, "candidate-not-found")
-    assert refused(adopt(service, name, job, top=1)) == (404, "candidate-not-found")
-    assert refused(adopt(service, name, job, left=None, right=None)) == (422, "candidate-refused")
+    assert problem_of(adopt(service, name, job, right=3)) == (404, "candidate-not-found")
+    assert problem_of(adopt(service, name, job, top=1)) == (404, "candidate-not-found")
+    assert problem_of(adopt(service, name, job, left=None, right=None)) == (422, "candidate-refused")
     stored = adopt(service, name, job, right=2).json()
     assert [depth(stored, camera) for camera in ("left", "right")] == [40, 60]
     other = found(service, f"{name}-2", place=site(f"{name}-2", "partly"))
@@ -72,7 +73,7 @@ def test_of_a_stored_venue_those_with_frames_are_found_and_the_others_stay(servi
 @in_one_home_first
 def test_what_was_found_is_calibrated_with_the_frames_of_the_search(service, name):
     job = found(service, name, place=site(name, "partly"))
-    assert refused(calibrate(service, job)) == (404, "venue-not-found")
+    assert problem_of(calibrate(service, job)) == (404, "venue-not-found")
     adopt(service, name, job, right=None).raise_for_status()
     answer = calibrate(service, job)
     assert (answer.status_code, answer.json()["kind"], answer.json()["venue"]) == (202, "calibration", name)
@@ -97,13 +98,13 @@ def test_the_frames_of_a_search_are_one_calibration_while_that_is_open(service, 
 
 def test_why_the_frames_of_a_job_calibrate_nothing_is_said(service, name):
     service.venue(name)
-    assert refused(calibrate(service, service.calibrated(name))) == (404, "poses-not-found")
+    assert problem_of(calibrate(service, service.calibrated(name))) == (404, "poses-not-found")
     partial = calibrate(service, found(service, name, files=upload(cameras=("left",))))
-    assert refused(partial) == (422, "missing-camera")
+    assert problem_of(partial) == (422, "missing-camera")
     assert "no frame of right" in partial.json()["detail"]
     job = found(service, name)
     forget_frames(service, job)
-    assert refused(calibrate(service, job)) == (410, "frames-deleted")
+    assert problem_of(calibrate(service, job)) == (410, "frames-deleted")
 
 
 def calibrate(service, job):
@@ -119,7 +120,7 @@ def test_a_stored_venue_gets_the_ridge_with_the_poses_of_all_of_its_cameras_and_
     service.venue(name, "crowned")
     job = found(service, name)
     assert adopt(service, name, job, right=None).json()["field"]["ridge"] is None
-    assert refused(adopt(service, name, job)) == (409, "venue-moved-on")
+    assert problem_of(adopt(service, name, job)) == (409, "venue-moved-on")
     service.http.post(f"/venues/{name}/restore", json={"revision": 1}).raise_for_status()
     assert adopt(service, name, job).json()["field"]["ridge"] == job["result"]["ridge"]
     back = service.http.post(f"/venues/{name}/restore", json={"revision": 1}).json()
@@ -138,16 +139,16 @@ def test_a_camera_that_was_put_elsewhere_meanwhile_keeps_that_pose(service, name
     job = found(service, name, files=upload(cameras=("left",)))
     assert service.calibrated(name)["result"]["accepted"]
     moved = depth(service.http.get(f"/venues/{name}").json(), "left")
-    assert refused(adopt(service, name, job)) == (409, "venue-moved-on")
+    assert problem_of(adopt(service, name, job)) == (409, "venue-moved-on")
     assert depth(service.http.get(f"/venues/{name}").json(), "left") == moved
 
 
 def test_the_venue_of_a_search_that_somebody_has_put_meanwhile_stays(service, name):
     job = found(service, name, place=site(name))
     service.venue(name)
-    assert refused(adopt(service, name, job)) == (409, "venue-moved-on")
-    assert refused(find(service, name, place=site(name))) == (409, "venue-stored")
-    assert refused(service.http.post(f"/jobs/{job['id']}/again")) == (409, "venue-stored")
+    assert problem_of(adopt(service, name, job)) == (409, "venue-moved-on")
+    assert problem_of(find(service, name, place=site(name))) == (409, "venue-stored")
+    assert problem_of(service.http.post(f"/jobs/{job['id']}/again")) == (409, "venue-stored")
     service.http.delete(f"/venues/{name}").raise_for_status()
     assert service.http.post(f"/jobs/{job['id']}/again").status_code == 202
     assert adopt(service, name, job).status_code == 201
@@ -157,7 +158,7 @@ def test_cameras_of_a_venue_that_was_deleted_meanwhile_make_no_new_one(service, 
     service.venue(name)
     job = found(service, name, files=upload(cameras=("left",)))
     service.http.delete(f"/venues/{name}").raise_for_status()
-    assert refused(adopt(service, name, job)) == (409, "venue-moved-on")
+    assert problem_of(adopt(service, name, job)) == (409, "venue-moved-on")
 
 
 def test_memories_of_a_found_camera_end_and_those_of_the_others_stay(service, name):
@@ -174,7 +175,7 @@ def test_found_poses_leave_in_the_formats_of_other_tools(service, name):
     exported = service.http.get(f"/jobs/{job['id']}/poses").raise_for_status().json()
     assert [camera["id"] for camera in exported["cameras"]] == ["left"]
     none = found(service, f"{name}-2", place=site(f"{name}-2", "reject"))
-    assert refused(service.http.get(f"/jobs/{none['id']}/poses")) == (404, "poses-not-found")
+    assert problem_of(service.http.get(f"/jobs/{none['id']}/poses")) == (404, "poses-not-found")
 
 
 def test_a_key_is_one_search_by_its_content(service, name):
@@ -212,26 +213,26 @@ def test_a_search_is_cancelled_and_its_frames_are_listed(service, name):
 def test_what_is_wrong_with_a_search_is_said_at_once(service, name, asked, answered):
     if isinstance(asked.get("place"), dict) and asked["place"].get("id") == "v":
         asked = asked | {"place": asked["place"] | {"id": name}}
-    assert refused(find(service, name, **asked)) == answered
+    assert problem_of(find(service, name, **asked)) == answered
 
 
 def test_what_is_wrong_with_a_search_of_a_stored_venue_is_said_at_once(service, name):
     whole = venue(name)
-    assert refused(find(service, name, place=site(name) | {"cameras": whole["cameras"]})) == (422, "nothing-to-find")
+    assert problem_of(find(service, name, place=site(name) | {"cameras": whole["cameras"]})) == (422, "nothing-to-find")
     service.venue(name)
-    assert refused(find(service, name, cameras=["top"])) == (404, "no-such-camera")
-    assert refused(find(service, name, files=upload()[:1], cameras=["right"])) == (422, "missing-camera")
-    assert refused(find(service, name, files=[("options", (None, "{}"))])) == (422, "nothing-to-find")
-    assert refused(service.http.post(f"/venues/{name}/find", json={})) == (415, "not-multipart")
+    assert problem_of(find(service, name, cameras=["top"])) == (404, "no-such-camera")
+    assert problem_of(find(service, name, files=upload()[:1], cameras=["right"])) == (422, "missing-camera")
+    assert problem_of(find(service, name, files=[("options", (None, "{}"))])) == (422, "nothing-to-find")
+    assert problem_of(service.http.post(f"/venues/{name}/find", json={})) == (415, "not-multipart")
 
 
 def test_what_cannot_be_taken_is_said(service, name):
     service.venue(name)
     calibration = service.calibrated(name)
-    assert refused(adopt(service, name, calibration)) == (404, "poses-not-found")
+    assert problem_of(adopt(service, name, calibration)) == (404, "poses-not-found")
     job = found(service, name)
-    assert refused(adopt(service, f"{name}-not", job)) == (404, "poses-not-found")
-    assert refused(adopt(service, name, job, {"If-Match": '"other"'})) == (412, "venue-changed")
+    assert problem_of(adopt(service, f"{name}-not", job)) == (404, "poses-not-found")
+    assert problem_of(adopt(service, name, job, {"If-Match": '"other"'})) == (412, "venue-changed")
     accepted = service.http.post(f"/jobs/{job['id']}/accept")
-    assert refused(accepted) == (404, "poses-not-found")
+    assert problem_of(accepted) == (404, "poses-not-found")
     assert f"/venues/{name}/adopt-found" in accepted.json()["detail"]

@@ -8,6 +8,7 @@ import pytest
 from service.schemas.names import FormatName
 from testbed.program import NEARER
 from testbed.running import SIZE
+from tests.problems import problem_of
 
 pytestmark = pytest.mark.slow
 
@@ -86,7 +87,7 @@ def test_a_file_that_the_caller_has_is_not_sent_again(service, name):
 def test_a_format_that_is_none_is_refused_with_those_there_are(service, name):
     service.venue(name)
     answer = poses(service, f"/venues/{name}", "fbx")
-    assert (answer.status_code, answer.json()["type"]) == (422, "/problems/invalid-request")
+    assert problem_of(answer) == (422, "invalid-request")
     for form in get_args(FormatName):
         assert f"'{form}'" in answer.json()["detail"]
 
@@ -112,4 +113,4 @@ def test_a_job_without_a_result_has_no_poses(service, name):
     job = service.submitted(service.venue(name, "fail"))
     service.end(job)
     answer = poses(service, f"/jobs/{job}", "json")
-    assert (answer.status_code, answer.json()["type"]) == (404, "/problems/poses-not-found")
+    assert problem_of(answer) == (404, "poses-not-found")

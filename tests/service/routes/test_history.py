@@ -2,6 +2,8 @@
 
 import pytest
 
+from tests.problems import problem_of
+
 
 def history(service, name, **params):
     return service.http.get(f"/venues/{name}/history", params=params)
@@ -34,7 +36,7 @@ def test_a_revision_is_restored_if_the_venue_is_the_one_that_was_seen(service, n
     service.calibrated(name)
     path = f"/venues/{name}/restore"
     refused = service.http.post(path, json={"revision": 1}, headers={"If-Match": old})
-    assert (refused.status_code, refused.json()["type"]) == (412, "/problems/venue-changed")
+    assert problem_of(refused) == (412, "venue-changed")
     seen = service.http.get(f"/venues/{name}").headers["etag"]
     restored = service.http.post(path, json={"revision": 1}, headers={"If-Match": seen})
     assert (restored.status_code, restored.headers["etag"]) == (200, old)

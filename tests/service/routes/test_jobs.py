@@ -10,6 +10,7 @@ from service.store import tables
 from service.store.jobs.files import frame_folder, pictures_folder
 from testbed.homes import in_both_homes, in_one_home_first
 from testbed.running import SIZE, png, upload
+from tests.problems import problem_of
 
 
 def test_of_a_result_that_is_accepted_in_part_that_part_is_stored_and_the_other_by_hand(service, name):
@@ -26,7 +27,7 @@ def test_of_a_result_that_is_accepted_in_part_that_part_is_stored_and_the_other_
     stored = service.http.get(f"/venues/{name}").json()["cameras"]
     assert [camera["pose"] for camera in stored] == [camera["pose"] for camera in job["result"]["cameras"]]
     nobody = service.http.post(f"/jobs/{job['id']}/accept", params={"camera": "nobody"})
-    assert (nobody.status_code, nobody.json()["type"]) == (404, "/problems/poses-not-found")
+    assert problem_of(nobody) == (404, "poses-not-found")
     assert nobody.json()["expected"] == ["left", "right"]
 
 
@@ -64,7 +65,7 @@ def test_the_same_frames_of_other_cameras_are_other_content(service, name):
     exchanged = [("left", frames[0]), ("left", frames[1]), ("right", frames[2])]
     job = service.http.post(f"/venues/{name}/calibrate", files=sent).json()["id"]
     answer = service.http.post(f"/venues/{name}/calibrate", files=exchanged)
-    assert (answer.status_code, answer.json()["type"]) == (409, "/problems/venue-busy")
+    assert problem_of(answer) == (409, "venue-busy")
     assert service.http.post(f"/venues/{name}/calibrate", files=sent).json()["id"] == job
 
 
@@ -91,7 +92,7 @@ def test_an_idempotency_key_stands_for_one_job_even_after_its_end(service, name)
     again = service.submit(name, headers=key)
     assert (again.status_code, again.json()["id"], again.json()["status"]) == (200, job, "succeeded")
     other = service.submit(name, 1, headers=key)
-    assert (other.status_code, other.json()["type"]) == (422, "/problems/idempotency-key-reused")
+    assert problem_of(other) == (422, "idempotency-key-reused")
     assert other.json()["job"] == job
 
 
@@ -161,7 +162,7 @@ def test_a_job_that_failed_says_what_was_asked_and_shows_its_frames(service, nam
     assert (job["status"], job["error"]["camera"], job["asked_by"]) == ("failed", "left", None)
     assert job["error"]["type"] == "/problems/no-markings-in-view"
     picture = service.http.get(f"/jobs/{job['id']}/preview.jpg")
-    assert (picture.status_code, picture.json()["type"]) == (404, "/problems/picture-not-found")
+    assert problem_of(picture) == (404, "picture-not-found")
     assert (job["options"]["dry_run"], job["options"]["generations"]) == (True, 7)
     assert isinstance(job["options"]["seed"], int)
     assert job["frames"].keys() == {"left", "right"}
@@ -169,7 +170,7 @@ def test_a_job_that_failed_says_what_was_asked_and_shows_its_frames(service, nam
     frame = service.http.get(address)
     assert (frame.headers["content-type"], frame.content) == ("image/png", png())
     missing = service.http.get(address[:-1] + "9")
-    assert (missing.status_code, missing.json()["type"]) == (404, "/problems/picture-not-found")
+    assert problem_of(missing) == (404, "picture-not-found")
 
 
 @in_one_home_first
@@ -200,4 +201,4 @@ def test_of_a_deleted_job_what_its_worker_writes_meanwhile_is_swept_once_it_must
 def test_an_id_that_no_job_can_have_is_answered_as_that_of_a_job_that_is_gone(service, nonsense):
     for path in ("", "/preview.jpg"):
         answer = service.http.get(f"/jobs/{nonsense}{path}")
-        assert (answer.status_code, answer.json()["type"]) == (404, "/problems/job-not-found")
+        assert problem_of(answer) == (404, "job-not-found")

@@ -8,6 +8,7 @@ import pytest
 
 from service.schemas.plan import PlanAnswer
 from testbed.running import venue
+from tests.problems import problem_of
 
 CAMERA = {"id": "end", "image_size": [1920, 1080], "position": [0.0, -14.0, 6.0], "look_at": [0.0, 0.0]}
 SITE = {"field": {"template": "volleyball"}, "cameras": [CAMERA | {"field_of_view_deg": 80}]}
@@ -55,5 +56,5 @@ def test_a_stored_venue_is_a_plan(service, name):
 )
 def test_a_plan_that_cannot_be_made_says_what_is_missing(service, site, words):
     refused = service.http.post("/plan", json=site)
-    assert (refused.status_code, refused.json()["type"]) == (422, "/problems/invalid-request")
+    assert problem_of(refused) == (422, "invalid-request")
     assert words in refused.json()["detail"]

@@ -3,6 +3,7 @@
 import pytest
 
 from testbed.running import venue
+from tests.problems import problem_of
 
 
 def poses(service, address, **params):
@@ -53,7 +54,7 @@ def test_a_camera_without_a_refined_pose_is_named_with_what_to_do(service, name)
         f"/jobs/{service.http.get('/jobs', params={'venue': name}).json()['jobs'][0]['id']}",
     ):
         problem = poses(service, address, lens="refined", camera="right")
-        assert (problem.status_code, problem.json()["type"]) == (404, "/problems/refined-not-found")
+        assert problem_of(problem) == (404, "refined-not-found")
         assert problem.json()["camera"] == "right"
         assert "lens=stored" in problem.json()["detail"]
     assert poses(service, f"/venues/{name}", lens="long").status_code == 422
@@ -61,7 +62,7 @@ def test_a_camera_without_a_refined_pose_is_named_with_what_to_do(service, name)
 
 def test_it_is_stored_in_the_venue_that_was_seen_and_for_a_camera_that_it_has(service, name, job):
     refused = adopt(service, name, **{"If-Match": '"another"'})
-    assert (refused.status_code, refused.json()["type"]) == (412, "/problems/venue-changed")
+    assert problem_of(refused) == (412, "venue-changed")
     assert adopt(service, name, "middle").json()["type"] == "/problems/no-such-camera"
     assert adopt(service, "nowhere").json()["type"] == "/problems/venue-not-found"
     seen = service.http.get(f"/venues/{name}").headers["etag"]

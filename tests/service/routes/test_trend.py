@@ -4,6 +4,8 @@ from datetime import UTC, datetime, timedelta
 
 import pytest
 
+from tests.problems import problem_of
+
 
 def trend(service, name, camera="left", **params):
     return service.http.get(f"/venues/{name}/cameras/{camera}/trend", params=params)
@@ -44,6 +46,6 @@ def test_a_venue_that_waits_for_its_first_pose_has_an_empty_trend(service, name)
 def test_what_there_is_no_trend_of_is_said(service, name):
     service.venue(name)
     camera = trend(service, name, "elsewhere")
-    assert (camera.status_code, camera.json()["type"]) == (404, "/problems/no-such-camera")
+    assert problem_of(camera) == (404, "no-such-camera")
     assert trend(service, "nowhere").status_code == 404
     assert [trend(service, name, since=day).status_code for day in ("yesterday", "0", "20261103")] == [422] * 3

@@ -3,6 +3,7 @@ import json
 import pytest
 
 from testbed.running import venue
+from tests.problems import problem_of
 
 MEASURED = {"length_m": 0.03, "width_m": 0.02}
 
@@ -79,7 +80,7 @@ def test_a_pose_in_another_convention_is_named_by_put_and_by_patch(service, name
 def test_a_conditional_put_of_an_outdated_venue_is_refused(service, name):
     old, new = (service.http.put(f"/venues/{name}", json=venue(name, b)).headers["etag"] for b in ("accept", "other"))
     answer = service.http.put(f"/venues/{name}", json=venue(name), headers={"If-Match": old})
-    assert (answer.status_code, answer.json()["type"]) == (412, "/problems/venue-changed")
+    assert problem_of(answer) == (412, "venue-changed")
     assert (answer.json()["expected"], answer.json()["got"]) == (old, new)
     assert service.http.put(f"/venues/{name}", json=venue(name), headers={"If-Match": new}).status_code == 200
     assert service.http.put(f"/venues/{name}", json=venue(name), headers={"If-None-Match": "*"}).status_code == 412
@@ -138,7 +139,7 @@ def test_a_conditional_patch_of_an_outdated_venue_is_refused(service, name):
     old = service.http.put(f"/venues/{name}", json=venue(name)).headers["etag"]
     new = patched(service, name, {"name": "a"}, **{"If-Match": old}).headers["etag"]
     answer = patched(service, name, {"name": "b"}, **{"If-Match": old})
-    assert (answer.status_code, answer.json()["type"]) == (412, "/problems/venue-changed")
+    assert problem_of(answer) == (412, "venue-changed")
     assert patched(service, name, {"name": "b"}, **{"If-Match": new}).status_code == 200
 
 
@@ -156,7 +157,7 @@ def test_a_conditional_patch_of_an_outdated_venue_is_refused(service, name):
 def test_a_patch_that_makes_no_venue_is_refused_and_changes_nothing(service, name, patch, kind):
     before = kept(service.http.put(f"/venues/{name}", json=venue(name)))
     answer = patched(service, name, patch)
-    assert (answer.status_code, answer.json()["type"]) == (422, f"/problems/{kind}")
+    assert problem_of(answer) == (422, kind)
     assert service.http.get(f"/venues/{name}").json() == before
 
 
@@ -170,7 +171,7 @@ def test_a_deleted_venue_is_gone(service, name):
     service.venue(name)
     assert service.http.delete(f"/venues/{name}").status_code == 204
     answer = service.http.get(f"/venues/{name}")
-    assert (answer.status_code, answer.json()["type"]) == (404, "/problems/venue-not-found")
+    assert problem_of(answer) == (404, "venue-not-found")
     assert service.http.delete(f"/venues/{name}").status_code == patched(service, name, {}).status_code == 404
 
 
@@ -250,7 +251,7 @@ def test_a_body_that_is_no_venue_is_refused(service, body):
 
 def test_the_id_in_the_address_is_the_id_of_the_venue(service):
     answer = service.http.put("/venues/one", json=venue("other"))
-    assert (answer.status_code, answer.json()["type"]) == (422, "/problems/venue-id-mismatch")
+    assert problem_of(answer) == (422, "venue-id-mismatch")
 
 
 def test_a_venue_may_be_of_another_sport(service, name):

@@ -13,6 +13,7 @@ from testbed.homes import in_both_homes, in_one_home_first
 from testbed.parameters import try_first
 from testbed.running import venue
 from testbed.stock import result
+from tests.problems import problem_of
 from tests.service.local_service import LocalService
 from worker.duties.alarms import AlarmTimer
 
@@ -96,7 +97,7 @@ def test_lists_name_a_venue_that_cannot_be_read_and_show_the_others(service, bro
 @in_one_home_first
 def test_alone_it_is_a_problem_that_says_what_to_do(service, broken):
     answer = service.ask("GET", broken)
-    assert (answer.status_code, answer.json()["type"]) == (409, "/problems/unreadable")
+    assert problem_of(answer) == (409, "unreadable")
     for way in ("/restore", "PUT /venues/broken", "DELETE"):
         assert way in answer.json()["detail"]
     assert (
@@ -213,7 +214,7 @@ def test_poses_with_a_ridge_that_no_field_has_are_not_accepted(stock, service):
     before = service.ask("GET", "/venues/v").json()
     assert stock.decisions.decidable(job).accept == frozenset()
     answer = service.ask("POST", f"/jobs/{job}/accept")
-    assert (answer.status_code, answer.json()["type"]) == (422, "/problems/poses-refused")
+    assert problem_of(answer) == (422, "poses-refused")
     assert "the ridge must be 0 to 3 m high, not -0.001 m" in answer.json()["detail"]
     assert service.ask("GET", "/venues/v").json() == before
 
