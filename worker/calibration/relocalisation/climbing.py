@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from worker.calibration.geometry.camera import Array
 from worker.calibration.geometry.rotation import rotation_matrices
@@ -47,6 +46,9 @@ def climb(
     cameras, scores = start, np.zeros(len(start))
     for level in levels:
         scores = agreement(field, view, cameras, level.tolerance_px)
+        if len(cameras) > level.survivors:
+            # Aligned, many turn out to be alike or hopeless, before they cost generations.
+            cameras, scores = _best_apart(*aligned(field, view, cameras, scores, level.tolerance_px, steps), level)
         for generation in range(level.generations):
             scale = level.scale * 0.9**generation
             offspring = _mutated(cameras, scale, steps, rng)
@@ -57,9 +59,7 @@ def climb(
             chosen = np.where(better, len(cameras) + rows * OFFSPRING + best, rows)
             cameras = Hypotheses.joined([cameras, offspring])[chosen]
             scores = np.maximum(scores, of_offspring[rows, best])
-        cameras, scores = aligned(field, view, cameras, scores, level.tolerance_px, steps)
-        kept = _apart(cameras, scores, level)
-        cameras, scores = cameras[kept], scores[kept]
+        cameras, scores = _best_apart(*aligned(field, view, cameras, scores, level.tolerance_px, steps), level)
     return cameras, scores
 
 
@@ -92,8 +92,8 @@ def _mutated(cameras: Hypotheses, scale: float, steps: LensSteps, rng: np.random
     return Hypotheses(rotations.reshape(-1, 3, 3), places.reshape(-1, 3), focal.reshape(-1), bends.reshape(-1))
 
 
-def _apart(cameras: Hypotheses, scores: Array, level: ClimbingRound) -> NDArray[np.intp]:
-    """Return the numbers of the best cameras no two of which are alike."""
+def _best_apart(cameras: Hypotheses, scores: Array, level: ClimbingRound) -> tuple[Hypotheses, Array]:
+    """Return the best cameras no two of which are alike, and their scores."""
     kept = list[int]()
     for n in np.argsort(-scores):
         far = level.scale * (0.2 + 0.03 * float(np.linalg.norm(cameras.positions[n])))
@@ -106,4 +106,4 @@ def _apart(cameras: Hypotheses, scores: Array, level: ClimbingRound) -> NDArray[
             kept.append(int(n))
         if len(kept) == level.survivors:
             break
-    return np.array(kept, dtype=np.intp)
+    return cameras[np.array(kept, dtype=np.intp)], scores[kept]

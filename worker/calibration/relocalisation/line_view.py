@@ -100,7 +100,16 @@ class LineView:
         For focal lengths (...).
         """
         normal = self.surface.normals(self.starts, self.ends, focal_px)
-        return np.asarray(normal / np.linalg.norm(normal, axis=-1, keepdims=True))
+        return _unit(normal)
+
+    def planes(self, focal_px: Array) -> tuple[Array, Array]:
+        """Return the unit normals of these planes and the unit rays to the middles of the segments, (F, S, 3) each."""
+        middles = self.surface.rays(tuple((self.starts + self.ends).T / 2), focal_px[:, None])
+        return self.normals(focal_px), _unit(np.stack(np.broadcast_arrays(*middles), axis=-1))
+
+
+def _unit(vectors: Array) -> Array:
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))
 
 
 def _laid_out(pixels: Array, surface: ViewSurface, focal: float) -> Array:

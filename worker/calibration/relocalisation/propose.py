@@ -1,6 +1,6 @@
 """Proposals of poses from a frame's lines and the field alone: the whole search, top to bottom."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,10 +10,17 @@ from worker.calibration.geometry.camera import Array, Pose
 from worker.calibration.geometry.lens import Lens
 from worker.calibration.geometry.rotation import rotation_vectors
 from worker.calibration.relocalisation.agreement import agreement
-from worker.calibration.relocalisation.climbing import LEVELS, climb
+from worker.calibration.relocalisation.climbing import LEVELS, ClimbingRound, climb
 from worker.calibration.relocalisation.drawing import draw, draw_at
 from worker.calibration.relocalisation.field_map import FieldMap
-from worker.calibration.relocalisation.hypotheses import FOCAL_SOUGHT, HALF_TURN, LENS_KNOWN, LENS_SOUGHT, Hypotheses
+from worker.calibration.relocalisation.hypotheses import (
+    FOCAL_SOUGHT,
+    HALF_TURN,
+    LENS_KNOWN,
+    LENS_SOUGHT,
+    Hypotheses,
+    LensSteps,
+)
 from worker.calibration.relocalisation.line_assignment import positions
 from worker.calibration.relocalisation.line_view import LineView
 from worker.calibration.relocalisation.repeated_markings import slid_along_field
@@ -39,33 +46,88 @@ def propose(field: FieldMap, response: NDArray[np.uint8], sought: SoughtCamera, 
     On a field that looks the same turned by half a turn, one of each two cameras, at a place where it may stand.
     """
     rng = np.random.default_rng(seed)
-    found = [
-        proposal
-        for lens in sought.lenses
-        for proposal in _through(
-            field, LineView.of(response, lens.lens, sought.roll_sigma_deg), lens, sought.place, rng
-        )
-    ]
-    return sorted(found, key=lambda one: -one.agreement)
+    searches = [_Search.by_lines(field, view, lens, sought.place, rng) for lens, view in _views(response, sought)]
+    # Agreement from which nothing is drawn at random: a pose found from lines is better than any draw.
+    if max((search.best for search in searches), default=1.0) < 0.45:
+        searches = [search.with_draws(rng) for search in searches]
+    proposals = [one for search in searches for one in search.with_repeated_markings(rng).proposals()]
+    return sorted(proposals, key=lambda one: -one.agreement)
 
 
 def agreement_by_lines(field: FieldMap, response: NDArray[np.uint8], sought: SoughtCamera, seed: int) -> float:
     """Return the best agreement 0..1 of cameras that the lines of `response` (height, width) lead to, as they are."""
     rng = np.random.default_rng(seed)
     best = 0.0
+    for lens, view in _views(response, sought):
+        directions = vote(view, focal_lengths(view, lens), _most_directions(lens), rng)
+        cameras = _by_lines(field, view, lens, sought.place, directions)
+        best = max(best, float(agreement(field, view, cameras, CAUGHT_PX).max(initial=0.0)))
+    return best
+
+
+def _views(response: NDArray[np.uint8], sought: SoughtCamera) -> Iterator[tuple[SoughtLens, LineView]]:
+    """Yield the lenses that are possible with the view of the lines through each, if there are any."""
     for lens in sought.lenses:
         view = LineView.of(response, lens.lens, sought.roll_sigma_deg)
         if view.painted_px > 0:
-            directions = vote(view, focal_lengths(view, lens), _most_directions(lens), rng)
-            best = max(
-                best,
-                float(
-                    agreement(field, view, _by_lines(field, view, lens, sought.place, directions), CAUGHT_PX).max(
-                        initial=0.0
-                    )
-                ),
-            )
-    return best
+            yield lens, view
+
+
+@dataclass(frozen=True)
+class _Search:
+    """The search through one lens: cameras `found` so far that have climbed, and their agreements (P,)."""
+
+    field: FieldMap
+    view: LineView
+    lens: SoughtLens
+    place: Place
+    found: Hypotheses
+    scores: Array
+
+    @classmethod
+    def by_lines(
+        cls, field: FieldMap, view: LineView, lens: SoughtLens, place: Place, rng: np.random.Generator
+    ) -> "_Search":
+        """Climb from cameras that lines lead to."""
+        directions = vote(view, focal_lengths(view, lens), _most_directions(lens), rng)
+        cameras = _by_lines(field, view, lens, place, _with_neighbours(directions, rng))
+        start = _best(field, view, cameras, CAUGHT_PX, 160)
+        return cls(field, view, lens, place, *climb(field, view, start, _steps(lens), rng))
+
+    @property
+    def best(self) -> float:
+        """Return the best agreement."""
+        return float(self.scores.max(initial=0.0))
+
+    def with_draws(self, rng: np.random.Generator) -> "_Search":
+        """Climb from what was found and from cameras drawn at random."""
+        drawn = _drawn(self.field, focal_lengths(self.view, self.lens), self.view.roll_sigma, self.place, rng)
+        return self._climbed(_best(self.field, self.view, drawn, 10.0, 120), LEVELS, rng)
+
+    def with_repeated_markings(self, rng: np.random.Generator) -> "_Search":
+        """Climb from what was found and from what looks alike where markings are repeated."""
+        slid = _at(self.place, self.field, slid_along_field(self.field, self.found))
+        return self._climbed(_best(self.field, self.view, slid, LEVELS[-2].tolerance_px, 6), LEVELS[-2:], rng)
+
+    def _climbed(self, more: Hypotheses, levels: Sequence[ClimbingRound], rng: np.random.Generator) -> "_Search":
+        start = Hypotheses.joined([self.found, more])
+        found, scores = climb(self.field, self.view, start, _steps(self.lens), rng, levels)
+        return replace(self, found=found, scores=scores)
+
+    def proposals(self) -> Iterator[ProposedCamera]:
+        """Yield the cameras that were found."""
+        found = self.found
+        for rotation, position, focal, bend, score in zip(
+            found.rotations, found.positions, found.focal_px, found.bends, self.scores, strict=True
+        ):
+            lens = _zoomed(_bent_more(self.lens.lens, bend), focal / self.view.focal_px)
+            yield ProposedCamera(lens, Pose(rotation_vectors(rotation), position), float(score))
+
+
+def _steps(lens: SoughtLens) -> LensSteps:
+    if lens.is_known:
+        return LENS_KNOWN
+    return FOCAL_SOUGHT if lens.is_bend_known else LENS_SOUGHT
 
 
 def _most_directions(lens: SoughtLens) -> int:
@@ -78,37 +140,6 @@ def _by_lines(
     """Return the cameras that look in these directions and that assignments of lines to markings lead to."""
     most = 220 if lens.is_known else 120
     return _at(place, field, Hypotheses.joined([positions(field, view, one, most) for one in directions]))
-
-
-def _through(
-    field: FieldMap, view: LineView, lens: SoughtLens, place: Place, rng: np.random.Generator
-) -> list[ProposedCamera]:
-    """Return the proposals for one lens: by lines first, by random draws only where lines do not suffice."""
-    if view.painted_px == 0:
-        return []
-    focal, known = focal_lengths(view, lens), lens.is_known
-    steps = LENS_KNOWN if known else FOCAL_SOUGHT if lens.is_bend_known else LENS_SOUGHT
-    directions = _with_neighbours(vote(view, focal, _most_directions(lens), rng), rng)
-    by_lines = _by_lines(field, view, lens, place, directions)
-    start = _best(field, view, by_lines, CAUGHT_PX, 60 if known else 160)
-    found, scores = climb(field, view, start, steps, rng)
-    # Agreement from which nothing is drawn at random: a pose found from lines is better than any draw.
-    if scores.max(initial=0.0) < 0.45:
-        drawn = _drawn(field, focal, view.roll_sigma, place, rng)
-        by_draws = _best(field, view, drawn, 10.0, 120)
-        found, scores = climb(field, view, Hypotheses.joined([by_draws, found]), steps, rng)
-    slid = _best(field, view, _at(place, field, slid_along_field(field, found)), LEVELS[-2].tolerance_px, 6)
-    found, scores = climb(field, view, Hypotheses.joined([found, slid]), steps, rng, LEVELS[-2:])
-    return [
-        ProposedCamera(
-            _zoomed(_bent_more(lens.lens, bend), focal / view.focal_px),
-            Pose(rotation_vectors(rotation), position),
-            float(score),
-        )
-        for rotation, position, focal, bend, score in zip(
-            found.rotations, found.positions, found.focal_px, found.bends, scores, strict=True
-        )
-    ]
 
 
 def _drawn(field: FieldMap, focal: Array, roll_sigma: float, place: Place, rng: np.random.Generator) -> Hypotheses:
@@ -124,7 +155,7 @@ def _with_neighbours(directions: list[Direction], rng: np.random.Generator) -> l
     return directions + [
         replace(one, pan_tilt_roll=one.pan_tilt_roll + np.radians((1.5, 1.5, 0.5)) * rng.normal(size=3))
         for one in directions[:6]
-        for _ in range(6)
+        for _ in range(2)
     ]
 
 

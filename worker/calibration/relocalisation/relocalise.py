@@ -85,10 +85,8 @@ def relocalise(
     observed = FrameObservations.of(field, channels, response)
     candidates = list[Candidate]()
     looked, through = observed, sought
-    # To search for a lens too is dear.
-    attempts = 2 if sought.is_lens_sought else 3
     farther = 2 if sought.is_lens_sought else REFINED
-    for attempt in range(attempts):
+    for attempt in range(3):
         pulse()
         proposals = [
             one for one in propose(markings, looked.small, through, seed + attempt) if one.agreement >= least_agreement

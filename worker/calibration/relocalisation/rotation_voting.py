@@ -78,33 +78,36 @@ def _peaks(view: LineView, focal: float, count: int) -> list[Direction]:
 
 def _climbed(view: LineView, start: Direction, frees_focal: bool, rng: np.random.Generator) -> Direction:
     """Return the best direction near a peak, by narrower votes."""
-    # Angle, rad, between a direction and the plane of a segment at which its vote is 1/e.
-    tolerance_rad = 0.006
-    (votes,) = _votes(view, start.pan_tilt_roll[None], np.array([start.focal_px]), tolerance_rad)
-    best = replace(start, votes=float(votes[0]))
+    best = start
     for number in range(7):
         narrower = 0.6**number
         spread = np.radians(1.4) * narrower
-        offspring = best.pan_tilt_roll + spread * rng.normal(size=(48, 3))
+        offspring = best.pan_tilt_roll + spread * np.r_[np.zeros((1, 3)), rng.normal(size=(48, 3))]
         more = best.focal_px * np.exp(0.06 * narrower * rng.normal(size=5)) if frees_focal else np.zeros(0)
         tried = np.array([best.focal_px, *more])
-        votes = _votes(view, offspring, tried, tolerance_rad)
+        votes = _votes(view, offspring, tried, spread / 2)
         focal, one = np.unravel_index(votes.argmax(), votes.shape)
-        if votes[focal, one] > best.votes:
-            best = Direction(offspring[one], float(tried[focal]), float(votes[focal, one]))
-    return best
+        best = Direction(offspring[one], float(tried[focal]), float(votes[focal, one]))
+    votes = _votes(view, best.pan_tilt_roll[None], np.array([best.focal_px]), 0.0)
+    return replace(best, votes=float(votes[0, 0]))
 
 
-def _votes(view: LineView, pan_tilt_roll: Array, focal_px: Array, tolerance: float) -> Array:
+def _votes(view: LineView, pan_tilt_roll: Array, focal_px: Array, off_rad: float) -> Array:
     """Return the share of all segments that runs along x or y, less for its roll: (F, P).
 
-    For each focal length (F,) of each direction (P, 3).
+    For each focal length (F,) of each direction (P, 3), which may be off by so much. A segment counts by how sure it
+    is: its ends are off by a part of a pixel, which is less of an angle through a longer lens, and turns a short
+    segment, which then misses a direction by the more the farther that is away from it.
     """
-    axes = rotations_of(*pan_tilt_roll.T)[:, :, :2].transpose(2, 0, 1).astype(np.float32)
-    normals = view.normals(focal_px).astype(np.float32)
-    lengths = view.lengths
-    along_x, along_y = np.abs(axes[:, None] @ normals.transpose(0, 2, 1))
-    share = np.exp(-((np.minimum(along_x, along_y) / tolerance) ** 2)) @ (lengths / lengths.sum())
+    along_x, along_y = rotations_of(*pan_tilt_roll.T)[:, :, :2].transpose(2, 0, 1).astype(np.float32)
+    normals, middles = (np.swapaxes(of_each, 1, 2).astype(np.float32) for of_each in view.planes(focal_px))
+    lengths = view.lengths.astype(np.float32)
+    # Standard deviation of an end, view pixels.
+    end_px = 0.5
+    shifted = off_rad**2 + (end_px / focal_px.astype(np.float32)[:, None, None]) ** 2
+    turned = (2 * end_px / lengths) ** 2
+    misses = [(axis @ normals) ** 2 / (shifted + turned * (1 - (axis @ middles) ** 2)) for axis in (along_x, along_y)]
+    share = np.exp(-np.minimum(*misses)) @ (lengths / lengths.sum())
     # Votes that a roll of one standard deviation costs.
     rolled = 0.02 * (pan_tilt_roll[:, 2] / view.roll_sigma) ** 2
     return np.asarray(share - rolled)
