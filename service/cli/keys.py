@@ -48,7 +48,9 @@ def add_key(
     with _keys(data) as keys:
         try:
             key = keys.add(name, scope, datetime.now(UTC) + timedelta(days) if days else None, venues or None)
-        except Problem:
+        except Problem as problem:
+            if problem.kind != "key-exists":
+                raise
             fail(f"There is a key {name} already: remove it first, or take another name.", USAGE)
         is_first = len(keys.all()) == 1
     _print_key(key)

@@ -14,12 +14,12 @@ from service.formats.records import CameraRecord, camera_matrix, lens_of
 from service.formats.rotations import (
     IDENTITY,
     Matrix,
-    applied,
     pose_from_matrix,
     pose_from_translation,
     product,
     rotation_of,
     split_matrix,
+    transform_vector,
     transposed,
     vector_of,
 )
@@ -65,7 +65,7 @@ def _row(numbers: Sequence[float]) -> str:
 
 def _transform(before: NumberedCamera, camera: NumberedCamera) -> Matrix:
     turn = product(camera.rotation, transposed(before.rotation))
-    turned = applied(turn, before.pose.translation)
+    turned = transform_vector(turn, before.pose.translation)
     moved = [part - by for part, by in zip(camera.pose.translation, turned, strict=True)]
     return [*([*row, part] for row, part in zip(turn, moved, strict=True)), [0.0, 0.0, 0.0, 1.0]]
 
@@ -117,7 +117,7 @@ def _chained(cameras: Sequence[tuple[str, Node]]) -> list[Pose | None]:
             node = camera["T_cn_cnm1"]
             rotation, translation = split_matrix(node)
             rotation_of(node, rotation)
-            moved = [part + by for part, by in zip(translation, applied(rotation, moved), strict=True)]
+            moved = [part + by for part, by in zip(translation, transform_vector(rotation, moved), strict=True)]
             turn = product(rotation, turn)
         poses.append(pose_from_translation(vector_of(turn), moved))
     return poses

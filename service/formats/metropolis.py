@@ -23,7 +23,7 @@ from service.formats.lens import COEFFICIENTS, NumberedCamera, cannot_hold
 from service.formats.nodes import Node
 from service.formats.parsing import ParsedFile
 from service.formats.records import CameraRecord, lens_of
-from service.formats.rotations import applied, pose_from_matrix, product, transposed
+from service.formats.rotations import pose_from_matrix, product, transform_vector, transposed
 
 # Pixels and the ground behind them are told at so many columns and rows of the picture, where the ground is no farther
 # off: next to the horizon a pixel is many metres.
@@ -91,7 +91,7 @@ def _ground_points(camera: NumberedCamera) -> Iterator[tuple[tuple[int, int], tu
 def _ground_behind(camera: NumberedCamera, column: int, row: int) -> tuple[float, float] | None:
     """Return x, y of the ground (z = 0) that a pixel of the undistorted picture shows; None: sky, or far off."""
     (fx, fy), (cx, cy) = camera.focal, camera.principal
-    right, ahead, up = applied(transposed(camera.rotation), [(column - cx) / fx, (row - cy) / fy, 1.0])
+    right, ahead, up = transform_vector(transposed(camera.rotation), [(column - cx) / fx, (row - cy) / fy, 1.0])
     x, y, height = camera.pose.position
     if up == 0 or height / -up <= 0:
         return None

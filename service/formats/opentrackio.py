@@ -18,7 +18,7 @@ from service.formats.lens import RADIAL, TANGENTIAL, NumberedCamera
 from service.formats.nodes import Node
 from service.formats.parsing import ParsedFile
 from service.formats.records import CameraRecord, camera_matrix, lens_of, stem_of
-from service.formats.rotations import IDENTITY, about, applied, product, transposed, vector_of
+from service.formats.rotations import IDENTITY, product, rotation_about, transform_vector, transposed, vector_of
 from service.schemas.geometry import Pose
 from service.schemas.problems import Problem
 
@@ -283,10 +283,10 @@ def _pose(top: Node) -> Pose:
     """Return the pose after all transforms, each in the frame of the one before, and the offset of the pupil."""
     turned, place = IDENTITY, [0.0, 0.0, 0.0]
     for transform in top["transforms"].elements():
-        moved = applied(turned, [transform["translation"][axis].number() for axis in "xyz"])
+        moved = transform_vector(turned, [transform["translation"][axis].number() for axis in "xyz"])
         place = [at + by for at, by in zip(place, moved, strict=True)]
         for axis, name in (("z", "pan"), ("x", "tilt"), ("y", "roll")):
-            turned = product(turned, about(axis, math.radians(transform["rotation"][name].number())))
+            turned = product(turned, rotation_about(axis, math.radians(transform["rotation"][name].number())))
     pupil = top["lens"].get("entrancePupilOffset")
     ahead = 0.0 if pupil is None else pupil.number()
     place = [at + ahead * row[1] for at, row in zip(place, turned, strict=True)]

@@ -30,12 +30,12 @@ def matrix_of(rotation: Sequence[float]) -> Matrix:
     return transposed([rotate(list(rotation), axis) for axis in axes])
 
 
-def about(axis: str, angle: float) -> Matrix:
+def rotation_about(axis: str, angle: float) -> Matrix:
     """Return the matrix (3, 3) of a turn about an axis x, y or z."""
     return matrix_of([angle if name == axis else 0.0 for name in "xyz"])
 
 
-def applied(matrix: Matrix, vector: Sequence[float]) -> list[float]:
+def transform_vector(matrix: Matrix, vector: Sequence[float]) -> list[float]:
     """Return the product of a matrix and a vector."""
     return [sum(x * y for x, y in zip(row, vector, strict=True)) for row in matrix]
 

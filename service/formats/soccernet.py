@@ -12,7 +12,7 @@ from service.formats.lens import RADIAL, TANGENTIAL, THIN_PRISM, NumberedCamera
 from service.formats.nodes import Node
 from service.formats.parsing import ParsedFile
 from service.formats.records import CameraRecord, camera_matrix, lens_of, stem_of
-from service.formats.rotations import Matrix, about, product, transposed, vector_of
+from service.formats.rotations import Matrix, product, rotation_about, transposed, vector_of
 from service.schemas.geometry import Pose
 
 
@@ -48,7 +48,7 @@ def _pan_tilt_roll(o: Matrix) -> tuple[float, float, float]:
         return math.atan2(o[1][0], o[0][0]), tilt, 0.0
     pan = math.atan2(o[0][2], -o[1][2])
     # What is left: nearly straight down, pan and roll are hardly known one by one, but well together.
-    left = product(transposed(product(about("z", pan), about("x", tilt))), o)
+    left = product(transposed(product(rotation_about("z", pan), rotation_about("x", tilt))), o)
     return pan, tilt, math.atan2(left[1][0], left[0][0])
 
 
@@ -61,7 +61,7 @@ def read(file: ParsedFile) -> list[CameraRecord]:
     """Return the camera of a file, named as the file."""
     node = _parameters(file.top)
     pan, tilt, roll = (math.radians(node[f"{name}_degrees"].number()) for name in ("pan", "tilt", "roll"))
-    orientation = product(product(about("z", pan), about("x", tilt)), about("z", roll))
+    orientation = product(product(rotation_about("z", pan), rotation_about("x", tilt)), rotation_about("z", roll))
     rotation = [[right, -down, -ahead] for right, down, ahead in transposed(orientation)]
     x, y, z = node["position_meters"].numbers(3)
     centre = node["principal_point"].numbers(2)

@@ -83,7 +83,7 @@ OF_LIVE_POSES = (
     ),
 )
 # Counters of the database: name, help, labels, the key of the counter, and the closed set of what its labels can be.
-COUNTED: Sequence[tuple[str, str, Sequence[str], str, Sequence[tuple[str, ...]]]] = (
+COUNTERS: Sequence[tuple[str, str, Sequence[str], str, Sequence[tuple[str, ...]]]] = (
     ("esc_jobs_ended", "Calibrations by their end.", ["status", "verdict", "error"], ENDED, OUTCOMES),
     (
         "esc_other_jobs_ended",
@@ -110,7 +110,7 @@ COUNTED: Sequence[tuple[str, str, Sequence[str], str, Sequence[tuple[str, ...]]]
     ),
 )
 # Histograms of the database: name, help, buckets, label and its values.
-TIMED: Sequence[tuple[str, str, HistogramBuckets, str, Sequence[str]]] = (
+HISTOGRAMS: Sequence[tuple[str, str, HistogramBuckets, str, Sequence[str]]] = (
     ("esc_job_wait_seconds", "Time from submission to start of calibrations.", WAIT, "", ()),
     ("esc_job_duration_seconds", "Time from start to end of calibrations.", DURATION, "", ()),
     ("esc_job_stage_duration_seconds", "Durations of stages of jobs with a result.", STAGE, "stage", STAGES),
@@ -230,12 +230,12 @@ def _queue(figures: StatisticsSnapshot) -> Iterator[Metric]:
 
 def _counters(counters: Mapping[CounterKey, float]) -> Iterator[Metric]:
     """Yield what the database has counted, 0 where nothing was."""
-    for name, meaning, labels, metric, outcomes in COUNTED:
+    for name, meaning, labels, metric, outcomes in COUNTERS:
         counted = CounterMetricFamily(name, meaning, labels=labels)
         for outcome in outcomes:
             counted.add_metric(outcome, counters.get((metric, outcome), 0))
         yield counted
-    for name, meaning, buckets, label, values in TIMED:
+    for name, meaning, buckets, label, values in HISTOGRAMS:
         timed = HistogramMetricFamily(name, meaning, labels=[label] if label else [])
         for of in [[value] for value in values] or [[]]:
             timed.add_metric(of, *buckets.read(counters, *of))
@@ -265,7 +265,7 @@ def _workers(workers: Sequence[WorkerHeartbeat], silence_s: float) -> Iterator[M
         names = [[worker.name] for worker in workers]
         yield _gauges(name, meaning, ["worker"], zip(names, values, strict=True))
     model = InfoMetricFamily("esc_worker_model", "Network of a worker; empty: missing.", labels=["worker"])
-    builds = InfoMetricFamily("esc_worker_build", "Version of a worker; empty: unknown.", labels=["worker"])
+    builds = InfoMetricFamily("esc_worker_build", "Version of a worker; empty: 0.1.0.", labels=["worker"])
     for worker in workers:
         model.add_metric([worker.name], {"sha256": worker.model_sha256 or ""})
         builds.add_metric([worker.name], {"version": worker.version or ""})

@@ -198,7 +198,7 @@ def require_camera_id(camera_id: str) -> None:
 def require_above_pitch(what: str, height_m: float) -> None:
     """Raise `ValueError` for a place on the ground or below it."""
     if height_m <= 0:
-        raise ValueError(f"{what} stands at z = {height_m:.6g} m: z points up, and a camera must be above the pitch")
+        raise ValueError(f"{what} stands at z = {height_m:.6g} m: z points up, and it must be above the pitch")
 
 
 def check_lens(lens: Intrinsics, image_size: list[int]) -> None:

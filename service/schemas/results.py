@@ -342,7 +342,7 @@ class Result(Schema):
         """Ids of the cameras whose poses may replace the stored ones."""
         return [camera.id for camera in self.cameras if camera.accepted]
 
-    def refused(self, because: str, reason: str = "all-or-none") -> "Result":
+    def refuse_all(self, because: str, reason: str = "all-or-none") -> "Result":
         """Return the result with every pose refused, for a reason of `REFUSAL_REASONS` (`service.schemas.problems`).
 
         The reasons that it was rejected for before stay.

@@ -242,7 +242,7 @@ def _refused_in_part(venue: Venue, options: Options, result: Result) -> Result:
     if result.verdict != "partly":
         return result
     if venue.accept == "all":
-        return result.refused("the venue accepts the poses of all cameras or none")
+        return result.refuse_all("the venue accepts the poses of all cameras or none")
     if options.fit_ridge:
-        return result.refused("a ridge is accepted with the poses of all cameras or not at all")
+        return result.refuse_all("a ridge is accepted with the poses of all cameras or not at all")
     return result

@@ -58,7 +58,7 @@ class Drawings:
             return None
         files = {camera: frame for camera, frame in frames.items() if frame is not None}
         asked = DrawingRequest.of(job.venue, job.result, drawn_together(name), self._threads)
-        _, drawn = ProgramMessage.decode(self._pool.run_at_once(asked.encode(files)))
+        _, drawn = ProgramMessage.decode(self._pool.run_in_this_thread(asked.encode(files)))
         for each, picture in drawn.items():
             self._blobs.put(f"{pictures.folder}/{picture_file(each)}", picture)
         self._forget_if_gone(job_id)

@@ -42,9 +42,9 @@ class ProgramPool:
     async def run(self, given: bytes) -> bytes:
         """Return what the program answers to `given` bytes, in turn."""
         async with self.turn():
-            return await run_in_threadpool(self.run_at_once, given)
+            return await run_in_threadpool(self.run_in_this_thread, given)
 
-    def run_at_once(self, given: bytes) -> bytes:
+    def run_in_this_thread(self, given: bytes) -> bytes:
         """Return what the program answers, in the thread of the caller, who has a turn."""
         return run_program(*self._arguments, given)
 

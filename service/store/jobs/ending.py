@@ -134,7 +134,7 @@ def _fold_calibration(
         if stored is not None and end.began_with and stored.venue.has_same_calibration_input_as(end.began_with):
             changes = _with_result(changes, state, stored, end, result, dry_run=dry_run)
         elif result.accepted_cameras:
-            result = result.refused("the venue was changed while the job ran", "venue-changed")
+            result = result.refuse_all("the venue was changed while the job ran", "venue-changed")
     elif end.status == "failed" and not dry_run:
         with suppress(UnreadableRow):
             stored = _stored_venue(state)

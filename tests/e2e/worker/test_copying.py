@@ -166,10 +166,11 @@ def test_a_service_on_the_copy_answers_as_the_one_before_and_goes_on(servers, st
 
 
 # The command on a disk so slow that a signal comes before its end, however long the one who sends it had to wait. Where
-# nohup started the tests, SIGHUP is ignored.
+# nohup started the tests, SIGHUP is ignored, and SIGINT where a shell did in the background.
 ON_A_SLOW_DISK = """
 import signal, time
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
+signal.signal(signal.SIGINT, signal.default_int_handler)
 from service.store.blobs import Blobs
 put = Blobs.put
 Blobs.put = lambda *object: (put(*object), time.sleep(0.05))

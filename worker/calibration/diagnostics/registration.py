@@ -139,7 +139,7 @@ class CommonGround:
 
 
 def common_ground(pitch: Field, first: Camera, second: Camera) -> CommonGround:
-    """Return the field's centre if both see it, else the middle of the common markings nearest to it.
+    """Return where two cameras are compared: the field's centre if both see it, else the nearest common markings.
 
     For a direction to count there must be enough line across it, and it must not be so far aside that a turn and a
     move of a camera which cancel there still shift the point: a court whose centre has no circle is held along its

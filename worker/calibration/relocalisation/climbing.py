@@ -18,7 +18,10 @@ OFFSPRING = 12
 
 @dataclass(frozen=True)
 class ClimbingRound:
-    """Generations at one tolerance (view px), with steps `scale` as wide as at first; `survivors` go on from it."""
+    """Generations at one tolerance (view px), with steps `scale` as wide as at first.
+
+    Of those that come at most `survivors` climb in it, and go on from it.
+    """
 
     tolerance_px: float
     generations: int

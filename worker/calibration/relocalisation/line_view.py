@@ -103,7 +103,7 @@ class LineView:
         return _unit(normal)
 
     def planes(self, focal_px: Array) -> tuple[Array, Array]:
-        """Return the unit normals of these planes and the unit rays to the middles of the segments, (F, S, 3) each."""
+        """Return these unit normals and the unit rays to the middles of the segments, both (F, S, 3)."""
         middles = self.surface.rays(tuple((self.starts + self.ends).T / 2), focal_px[:, None])
         return self.normals(focal_px), _unit(np.stack(np.broadcast_arrays(*middles), axis=-1))
 
