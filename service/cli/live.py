@@ -209,19 +209,18 @@ def _send(
     cameras = ", ".join(f"{camera.id} (source {n})" for n, camera in enumerate(stored.cameras, 1))
     print_note(f"Sending the poses of venue {stored.id}, stored ones {float(sample_rate):g} times a second: {cameras}")
     streams.start()
-    tasks: list[Callable[[Client], None]] = [
-        partial(_report, reporter=reporter, stop=stop),
-        partial(_ask_for_poses, poses=poses, streams=streams, reporter=reporter, stop=stop),
-    ]
-    if recover:
-        recovery = Recovery(stored.id, streams, _RecoveryNotes())
-        tasks.append(partial(recovery.run, stop=stop))
-    threads = [_start(task, *service) for task in tasks] if service is not None else []
+    reporting = None
+    if service is not None:
+        reporting = _start(partial(_report, reporter=reporter, stop=stop), *service)
+        asking = partial(_ask_for_poses, poses=poses, streams=streams, reporter=reporter, stop=stop)
+        _start(asking, *service)
+        if recover:
+            recovery = Recovery(stored.id, streams, _RecoveryNotes())
+            _start(partial(recovery.run, stop=stop), *service)
     send_stored_poses(poses, sender, sample_rate, stop, streams.is_tracked)
     streams.stop()
-    # Of the threads only the one that reports has something left to do.
-    for thread in threads[:1]:
-        thread.join(LAST_REPORT_S)
+    if reporting is not None:
+        reporting.join(LAST_REPORT_S)
     # A filter whose reader has gone says nothing.
     if not unread.is_set():
         print_note("Stopped.")

@@ -69,8 +69,8 @@ class Snapshots:
                 task = self._task(cameras, credentials, folder, within_s).model_copy(
                     update={"frames": frames, "spacing_s": spacing_s}
                 )
-                none = f"it gave no frame within {task.seconds:g} s"
-                silent = {one.id: SourceAnswer(camera=one.id, why=none, seconds=task.seconds) for one in cameras}
+                why = f"it gave no frame within {task.seconds:g} s"
+                silent = {one.id: SourceAnswer(camera=one.id, why=why, seconds=task.seconds) for one in cameras}
                 answers = silent | self._ask(task, credentials)
                 self._count(answers.values())
                 budget = image_checks.PixelBudget(self._settings)

@@ -66,8 +66,16 @@ AlarmRule = Literal[
     "live-late",
     "live-silent",
 ]
-# The members of `Alarms` that set the rules.
-SETTINGS: dict[AlarmRule, str] = {
+AlarmSetting = Literal[
+    "moved_since_last_px",
+    "moved_since_first_px",
+    "rejected_in_a_row",
+    "not_calibrated_for_h",
+    "trend_m",
+    "knocked",
+    "live",
+]
+SETTINGS: dict[AlarmRule, AlarmSetting] = {
     "moved-since-last": "moved_since_last_px",
     "moved-since-first": "moved_since_first_px",
     "rejected-in-a-row": "rejected_in_a_row",
@@ -84,9 +92,7 @@ class Alarm(Schema):
     """An active alarm of one camera, or of the whole venue."""
 
     rule: Annotated[AlarmRule, OPEN_WORD] = Field(description="Rule that is broken.")
-    setting: (
-        Annotated[str, Field(json_schema_extra={"x-extensible-enum": [*dict.fromkeys(SETTINGS.values())]})] | None
-    ) = Field(
+    setting: Annotated[AlarmSetting, OPEN_WORD] | None = Field(
         default_factory=lambda alarm: SETTINGS.get(alarm["rule"]),
         description="Name of the rule in the venue's `alarms`; null for a rule that only a newer version knows.",
     )

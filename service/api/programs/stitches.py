@@ -24,9 +24,10 @@ class Stitches:
 
     def __init__(self, settings: Settings) -> None:
         self._threads = settings.threads
-        program, busy = (settings.stitch_program, settings.native_environment), "Packages of others are being made."
-        self._packages = ProgramPool("package of a stitched view", *program, PACKAGE_S, busy=busy)
-        self._previews = ProgramPool("preview", *program, PREVIEW_S)
+        program, native = settings.stitch_program, settings.native_environment
+        busy = "Packages of others are being made."
+        self._packages = ProgramPool("package of a stitched view", program, native, PACKAGE_S, busy=busy)
+        self._previews = ProgramPool("preview", program, native, PREVIEW_S)
         # Keys of which a package is made or waits.
         self._owners: set[str] = set()
 

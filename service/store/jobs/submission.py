@@ -1,7 +1,6 @@
 """Submission: frames and options of a client become a job, or are found to be one already."""
 
 import hashlib
-from dataclasses import asdict
 from datetime import datetime, timedelta
 from typing import Any
 
@@ -178,7 +177,10 @@ def _insert(
         "venue_document": None if venue is None else to_document(venue),
         "site": None if submission.site is None else to_document(submission.site),
         "frames": submission.frames,
-        **asdict(submission.origin),
+        "asked_by": submission.origin.asked_by,
+        "address": submission.origin.address,
+        "request_id": submission.origin.request_id,
+        "traceparent": submission.origin.traceparent,
         "created_at": now,
         "updated_at": now,
     }

@@ -59,8 +59,7 @@ def agreement_by_lines(field: FieldMap, response: NDArray[np.uint8], sought: Sou
     rng = np.random.default_rng(seed)
     best = 0.0
     for lens, view in _views(response, sought):
-        directions = vote(view, focal_lengths(view, lens), _most_directions(lens), rng)
-        cameras = _by_lines(field, view, lens, sought.place, directions)
+        cameras = _by_lines(field, view, lens, sought.place, _directions(view, lens, rng))
         best = max(best, float(agreement(field, view, cameras, CAUGHT_PX).max(initial=0.0)))
     return best
 
@@ -89,8 +88,8 @@ class _Search:
         cls, field: FieldMap, view: LineView, lens: SoughtLens, place: Place, rng: np.random.Generator
     ) -> "_Search":
         """Climb from cameras that lines lead to."""
-        directions = vote(view, focal_lengths(view, lens), _most_directions(lens), rng)
-        cameras = _by_lines(field, view, lens, place, _with_neighbours(directions, rng))
+        directions = _with_neighbours(_directions(view, lens, rng), rng)
+        cameras = _by_lines(field, view, lens, place, directions)
         start = _best(field, view, cameras, CAUGHT_PX, 160)
         return cls(field, view, lens, place, *climb(field, view, start, _steps(lens), rng))
 
@@ -130,8 +129,8 @@ def _steps(lens: SoughtLens) -> LensSteps:
     return FOCAL_SOUGHT if lens.is_bend_known else LENS_SOUGHT
 
 
-def _most_directions(lens: SoughtLens) -> int:
-    return 24 if lens.is_known else 36
+def _directions(view: LineView, lens: SoughtLens, rng: np.random.Generator) -> list[Direction]:
+    return vote(view, focal_lengths(view, lens), 24 if lens.is_known else 36, rng)
 
 
 def _by_lines(

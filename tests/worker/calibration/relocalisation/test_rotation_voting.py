@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from testbed.synthetic import PITCH, camera, paint_frame
-from tests.worker.calibration.relocalisation.test_relocalise import response_to
+from tests.worker.calibration.outdated_pair import white_on_green
+from worker.calibration.detection.segmentation import whole_frame
 from worker.calibration.relocalisation import propose as proposals
 from worker.calibration.relocalisation.field_map import FieldMap
 from worker.calibration.relocalisation.line_view import LineView
@@ -17,7 +18,7 @@ ASKEW = camera("one", (20.0, -60.0, 15.0), (30.0, 0.0), focal=1500.0)
 
 
 def response(truth):
-    return np.rint(response_to(paint_frame(PITCH, truth)) * 255).astype(np.uint8)
+    return white_on_green(paint_frame(PITCH, truth), [whole_frame(truth.intrinsics.size)])
 
 
 @pytest.mark.parametrize("truth", [STRAIGHT_AHEAD, ASKEW], ids=["straight-ahead", "askew"])
