@@ -223,7 +223,8 @@ def _found(pitch: Field, truth: Camera, frame: Frame, knowing: str, seed: int, e
                 "found": one.evidence.agreement,
                 "unexpected": one.overlap.unexpected,
                 "iou": one.overlap.iou,
-                "shift_px": one.shift_px,
+                "sure_px": None if one.ground_sigma is None else one.ground_sigma.rms_px,
+                "residual_px": one.residual_px,
                 "off_px": off_px(one.camera),
             }
             for one in camera.candidates

@@ -31,7 +31,7 @@ from worker.calibration.geometry.visibility import VisibleLines
 from worker.calibration.memory.camera_memory import CameraMemory
 from worker.calibration.refinement.diagnosis import find_suspicions
 from worker.calibration.refinement.refine import refine
-from worker.calibration.relocalisation.candidate import free_lens, shift_sigma_px, with_sigmas
+from worker.calibration.relocalisation.candidate import free_lens, with_sigmas
 from worker.calibration.relocalisation.relocalise import LEAST_SURE
 
 
@@ -164,9 +164,8 @@ def _life(focal: float, view: str, mistake: Mistake) -> list[Answer]:
         # As a search does it, too: the lens that the lines have is taken in its place.
         freed = refine(mistake.pitch, [found], sight, 0.0, free_lens(0, found)).each[0]
         found = with_sigmas(freed)
-        shift_px = shift_sigma_px(freed)
         (result,) = Installation(mistake.pitch, [found]).night(sight)
-        is_sure = shift_px is not None and shift_px <= LEAST_SURE / 2 * found.intrinsics.size[0]
+        is_sure = freed.ground_sigma is not None and freed.ground_sigma.rms_px <= LEAST_SURE * found.intrinsics.size[0]
         result = result if is_sure else replace(result, refusal=Refusal("undetermined", "lens and pose slide together"))
     is_found = result.accepted
     answer = Answer.of(result, real)

@@ -1,7 +1,7 @@
 """The engine's other page: frames without poses in, cameras with verdicts out."""
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,7 +18,7 @@ from worker.calibration.geometry.field import Field
 from worker.calibration.records import Calibration, Options, Progress, ProgressReporter, Segment, StageTimings
 from worker.calibration.refinement.diagnosis import Suspicion
 from worker.calibration.refinement.refine import Observations
-from worker.calibration.refinement.uncertainty import FOCAL
+from worker.calibration.refinement.uncertainty import FOCAL, Sigma
 from worker.calibration.relocalisation.candidate import Candidate, FrameObservations
 from worker.calibration.relocalisation.crown import find_crown
 from worker.calibration.relocalisation.field_halves import choose_sides, side_of
@@ -150,12 +150,16 @@ def find_cameras(
         options = Options(seed=seed, recover="never")
         return calibrate(pitch, [*found, *beside], frames, remembered, options, stop=stop)
 
-    with progress.timed("calibration"):
-        calibrated = calibrated_where_found()
-        unfit = {} if calibrated is None else _with_unfit_lenses(sought, calibrated)
+    def take_lenses_of_lines(unfit: Mapping[str, str]) -> None:
         for camera, words in unfit.items():
             by_id[camera] = replace(by_id[camera], lenses=[SoughtLens.around(by_id[camera].lenses[0].lens, LENS_OFF)])
             placed[camera] = _through_lens_of_lines(pitch, markings, by_id[camera], placed[camera], seen[camera], words)
+
+    with progress.timed("calibration"):
+        take_lenses_of_lines(_with_loose_lenses(sought, placed))
+        calibrated = calibrated_where_found()
+        unfit = {} if calibrated is None else _with_unfit_lenses(by_id.values(), calibrated)
+        take_lenses_of_lines(unfit)
         if unfit:
             calibrated = calibrated_where_found()
     judged = [_judged(camera, placed[camera.id], calibrated) for camera in by_id.values()]
@@ -305,7 +309,14 @@ def _on_its_crown(
     }
 
 
-def _with_unfit_lenses(sought: Sequence[SoughtCamera], calibrated: Calibration) -> dict[str, str]:
+def _with_loose_lenses(sought: Iterable[SoughtCamera], placed: Mapping[str, Relocalisation]) -> dict[str, str]:
+    """Return the cameras that were found and whose given lens leaves open where they stand, and the words for it."""
+    found = {one.id: placed[one.id].candidates[0].sigma for one in sought if placed[one.id].refusal is None}
+    loose = {one.id: why_lens_loose(found.get(one.id)) for one in sought if not one.is_lens_sought}
+    return {camera: words for camera, words in loose.items() if words is not None}
+
+
+def _with_unfit_lenses(sought: Iterable[SoughtCamera], calibrated: Calibration) -> dict[str, str]:
     """Return what speaks against the lens that was given, in words, of each camera of which anything does."""
     results = {result.camera.id: result for result in calibrated.cameras}
     unfit = {
@@ -326,7 +337,7 @@ def _through_lens_of_lines(
 ) -> Relocalisation:
     """Return a camera that was found with the lens that its lines have, which is `sought` now; `words`: why it is."""
     first, *others = found.candidates
-    candidates = [FrameObservations.of(pitch, *seen).candidate(first.camera, sought), *others]
+    candidates = [FrameObservations.of(pitch, *seen).settled(first.camera, sought), *others]
     refusal = why_not_taken(pitch, markings, sought, candidates)
     return replace(found, candidates=candidates, refusal=refusal, remarks=[*found.remarks, words])
 
@@ -372,7 +383,6 @@ def why_lens_unfit(result: CameraResult, suspicions: Sequence[Suspicion]) -> str
     if result.refusal is not None:
         return f"{result.refusal.words}: {IN_ITS_PLACE}" if result.refusal.reason == "residual" else None
     focal_px = result.camera.intrinsics.focal_length_px
-    assert result.sigma is not None
     for one in suspicions:
         away_m = 0.0 if result.refined is None else result.camera.distance_m(result.refined.camera)
         if (one.camera, one.quantity) == (result.camera.id, FOCAL) and away_m > GATE.largest_zoomed_m:
@@ -381,10 +391,15 @@ def why_lens_unfit(result: CameraResult, suspicions: Sequence[Suspicion]) -> str
                 f"the lines fit a focal length {by} {'longer' if one.deviation > 0 else 'shorter'} than that of the "
                 f"lens that was given, which puts the camera {away_m:.2f} m from where it seems to be: {IN_ITS_PLACE}"
             )
-    if result.sigma.position_m > GATE.largest_found_sigma_m:
-        return (
-            "how far off the lens may be that was given leaves open where the camera stands: "
-            f"{result.sigma.position_m:.2f} m (at most {GATE.largest_found_sigma_m} allowed): {IN_ITS_PLACE}; say how "
-            "well it is known (sigma), if it was measured"
-        )
-    return None
+    return why_lens_loose(result.sigma)
+
+
+def why_lens_loose(sigma: Sigma | None) -> str | None:
+    """Return in words that a given lens leaves open where its camera stands; None if the pose is as sure as it must."""
+    if sigma is None or sigma.position_m <= GATE.largest_found_sigma_m:
+        return None
+    return (
+        "how far off the lens may be that was given leaves open where the camera stands: "
+        f"{sigma.position_m:.2f} m (at most {GATE.largest_found_sigma_m} allowed): {IN_ITS_PLACE}; say how "
+        "well it is known (sigma), if it was measured"
+    )

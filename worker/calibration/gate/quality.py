@@ -256,13 +256,18 @@ def _why_undetermined(ground: GroundSigma | None) -> str | None:
     advice = "let the camera see lines in more than one direction, or measure lens or field again"
     if ground is None:
         return f"no marking is in view where the pose puts the camera; {advice}"
+    left_open = ground_left_open(ground)
+    return left_open and f"the visible lines do not determine the pose: {left_open}; {advice}"
+
+
+def ground_left_open(ground: GroundSigma) -> str | None:
+    """Return in words how far off markings in view may be on the ground; None if by no more than is allowed."""
     metres, pixels, beyond = ground.worst(GATE.largest_ground_sigma_m, GATE.largest_ground_sigma_px)
     if not beyond:
         return None
     return (
-        f"the visible lines do not determine the pose: what is in view may lie {metres:.2f} m ({pixels:.1f} px) from "
-        f"where it is put on the ground (sigma, at most {GATE.largest_ground_sigma_m} m or "
-        f"{GATE.largest_ground_sigma_px} px allowed); {advice}"
+        f"what is in view may lie {metres:.2f} m ({pixels:.1f} px) from where it is put on the ground (sigma, at most "
+        f"{GATE.largest_ground_sigma_m} m or {GATE.largest_ground_sigma_px} px allowed)"
     )
 
 

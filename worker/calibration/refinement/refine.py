@@ -140,6 +140,26 @@ def refine(
     return _with_pose_shift_if_corrected(_assessed(estimate, stored or cameras, remembered, refiner), estimate, refiner)
 
 
+def refine_coarsely(
+    pitch: Field,
+    cameras: Sequence[Camera],
+    observations: Observations,
+    free: Sequence[Parameter] = (),
+    searches_px: Sequence[float] = SEARCH_PX,
+) -> RefinedPoses:
+    """Move the cameras onto the lines as each frame is read on the way there, once; arguments as for `refine`.
+
+    Good to compare hypotheses. Where they end depends a little on where they begin, by less than their sigma.
+    """
+    unknowns = Unknowns(len(cameras), free, Ground.under(pitch.measured_points))
+    begun = Estimate.initial(pitch, cameras, unknowns)
+    refiner = _Refiner(observations.reader(), unknowns, np.empty(0, np.intp), cameras)
+    caught = refiner.catch(begun, searches_px)
+    last = replace(refiner.around(caught), found=caught.cameras).follow(caught)
+    uneven = last.unevenness(unknowns, unknowns.ground.ordinary)
+    return _assessed(replace(last.to, uneven_m=uneven), cameras, [None] * len(cameras), refiner)
+
+
 @dataclass(frozen=True)
 class _Refiner:
     """Gauss-Newton refinement of cameras `found` near the lines that a `reader` measures.

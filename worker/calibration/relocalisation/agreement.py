@@ -32,7 +32,8 @@ def _agreement(field: FieldMap, view: LineView, cameras: Hypotheses, tolerance: 
     explained = _explained(field, view, cameras, tolerance) * view.painted_px
     # Length of line that is taken for missing from every view, so that little in view is not all in view.
     # Fewest points of markings in view for an agreement to count in full.
-    dice = (found + explained) / (expected + view.painted_px + 40.0) * np.minimum(1.0, points / 30)
+    fewest = 30 / field.every
+    dice = (found + explained) / (expected + view.painted_px + 40.0) * np.minimum(1.0, points / fewest)
     # Agreement that a roll of one standard deviation costs.
     rolled = 0.01 * (cameras.rotations[:, 0, 2] / np.sin(view.roll_sigma)) ** 2
     return np.where(cameras.positions[:, 2] > LOWEST_M, dice - rolled, 0.0)
@@ -62,7 +63,7 @@ def _expected_and_found(
     counted = seen & view.covered.ravel().take(cell) & field.joined
     step = np.diff(x, axis=1, append=x[:, -1:]) ** 2 + np.diff(y, axis=1, append=y[:, -1:]) ** 2
     # Longest counted distance between two points of a marking in the view, view pixels.
-    lengths = np.minimum(np.sqrt(step), 25.0) * counted
+    lengths = np.minimum(np.sqrt(step), 25.0 * field.every) * counted
     near = np.exp(-((view.distance.ravel().take(cell) / tolerance) ** 2))
     return lengths.sum(axis=1), (lengths * near).sum(axis=1), counted.sum(axis=1)
 

@@ -14,8 +14,8 @@ from worker.calibration.geometry.derivatives import POSE_NUMBERS
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.lens import SIGMA_NAMES
 from worker.calibration.geometry.parameters import LensParameter, free_lens_sigma
-from worker.calibration.refinement.refine import Observations, refine
-from worker.calibration.refinement.uncertainty import RefinedPose, Sigma
+from worker.calibration.refinement.refine import Observations, refine, refine_coarsely
+from worker.calibration.refinement.uncertainty import GroundSigma, RefinedPose, Sigma
 from worker.calibration.relocalisation.paint import Paint, share
 from worker.calibration.relocalisation.sought import SoughtCamera
 
@@ -26,8 +26,8 @@ class Candidate:
 
     `agreement` 0..1: the harmonic mean of the share of expected lines seen beyond chance, as `evidence` has it, and of
     the share of the frame's paint that is `explained`; `explains` (n,): True for places on paint that lie on such a
-    line; `residual_px`: rms of its lines, None where too few were measured, as `sigma` of the pose and `shift_px`, how
-    far off the markings in view may be for all that the lines leave open of pose and lens (rms, one sigma).
+    line; `residual_px`: rms of its lines, None where too few were measured, as `sigma` of the pose and `ground_sigma`,
+    how well all that the lines tell of pose and lens puts the markings in view on the ground.
     """
 
     camera: Camera
@@ -37,7 +37,7 @@ class Candidate:
     overlap: Overlap
     residual_px: float | None
     sigma: Sigma | None
-    shift_px: float | None
+    ground_sigma: GroundSigma | None
 
     @property
     def explained(self) -> float:
@@ -66,7 +66,12 @@ class FrameObservations:
         return FrameObservations.of(self.field, channels, np.minimum(np.float32(times) * response, np.float32(1.0)))
 
     def candidate(self, camera: Camera, sought: SoughtCamera) -> Candidate:
-        """Refine a proposed camera onto the measured lines close by, with its lens if that is sought."""
+        """Refine a proposed camera coarsely onto the measured lines close by, with its lens if that is sought."""
+        lens = free_lens(0, camera) if sought.is_lens_sought else []
+        return self.assessed(refine_coarsely(self.field, [camera], self.observations, lens).each[0], sought)
+
+    def settled(self, camera: Camera, sought: SoughtCamera) -> Candidate:
+        """Refine a camera until it stands still, with its lens if that is sought."""
         lens = free_lens(0, camera) if sought.is_lens_sought else []
         return self.assessed(refine(self.field, [camera], self.observations, 0.0, lens).each[0], sought)
 
@@ -81,7 +86,7 @@ class FrameObservations:
         # refinement sees some of the lines and not all. Most proposals are right to a pixel or two, and from there what
         # lies farther off may be blotches of snow and worn grass; of others some lines are caught and one is taken for
         # its neighbour.
-        caught = refine(self.field, [camera], self.observations, 0.0, first, (60.0, 28.0, 14.0, 8.0, 5.0)).each[0]
+        caught = refine_coarsely(self.field, [camera], self.observations, first, (60.0, 28.0, 14.0, 8.0, 5.0)).each[0]
         far = self.candidate(caught.camera, sought) if sought.is_lens_sought else self.assessed(caught, sought)
         return far if is_better(far, close) else close
 
@@ -95,8 +100,9 @@ class FrameObservations:
         both = 2 * seen * explained / max(seen + explained, 1e-9)
         sigma = None if found.covariance is None else Sigma.from_covariance(found.covariance)
         overlap = overlap_of(self.field, found.camera, self.observations.responses[0])
-        shift_px = shift_sigma_px(found)
-        return Candidate(found.camera, both, explains, found.evidence, overlap, found.residual_px, sigma, shift_px)
+        return Candidate(
+            found.camera, both, explains, found.evidence, overlap, found.residual_px, sigma, found.ground_sigma
+        )
 
 
 def is_better(one: Candidate, other: Candidate) -> bool:
@@ -128,8 +134,3 @@ def with_sigmas(found: RefinedPose) -> Camera:
     known = {short: sigma for (name, short), sigma in named if name in found.camera.intrinsics.parameters}
     known["fy"] = float(np.hypot(known["fx"], known.pop("aspect") * found.camera.intrinsics.focal_length_px))
     return found.camera.with_lens(replace(found.camera.intrinsics, sigma=known, sigma_from="lines"))
-
-
-def shift_sigma_px(found: RefinedPose) -> float | None:
-    """Return the rms standard deviation (px) of the markings in view by pose, lens and field; None without any."""
-    return None if found.ground_sigma is None else found.ground_sigma.rms_px

@@ -12,8 +12,8 @@ import numpy as np
 
 from worker.calibration.gate.quality import GATE
 from worker.calibration.geometry.field import Field
-from worker.calibration.geometry.parameters import free_ridge
-from worker.calibration.refinement.refine import Observations, refine
+from worker.calibration.geometry.parameters import Parameter, free_ridge
+from worker.calibration.refinement.refine import Observations, refine, refine_coarsely
 from worker.calibration.relocalisation.candidate import Candidate, FrameObservations, free_lens
 from worker.calibration.relocalisation.sought import SoughtCamera
 
@@ -34,24 +34,29 @@ def find_crown(
     `candidates`: the result on the `flat` field for each camera that was `sought`; `observations`: of the same cameras.
     A lens that was given stays.
     """
-    cameras = [one.camera for one in candidates]
-    lenses = [
-        parameter
-        for number, (camera, one) in enumerate(zip(cameras, sought, strict=True))
-        if one.is_lens_sought
-        for parameter in free_lens(number, camera)
-    ]
-    found = refine(flat, cameras, observations, 0.0, [*lenses, *free_ridge(flat)])
+    found = refine_coarsely(flat, [one.camera for one in candidates], observations, _free(flat, sought, candidates))
     height_m, sigma_m = found.pitch.ridge_height, found.parameter_uncertainties[-1].sigma
     # It is at least 5 cm high, and five of its standard deviations.
     if not max(0.05, 5.0 * sigma_m) < height_m < GATE.highest_ridge_m:
         return None
+    found = refine(found.pitch, found.cameras, observations, 0.0, _free(found.pitch, sought, candidates))
     observed = map(partial(FrameObservations.of, found.pitch), observations.channels, observations.responses)
     refined = [frame.assessed(pose, one) for frame, pose, one in zip(observed, found.each, sought, strict=True)]
     # Largest ratio of the lines' rms distance from the cameras with a ridge to that on a flat field.
     if not _rms(refined) < 0.85 * _rms(candidates):
         return None
     return CrownedField(found.pitch, refined)
+
+
+def _free(field: Field, sought: Sequence[SoughtCamera], candidates: Sequence[Candidate]) -> list[Parameter]:
+    """Return what is found along with the poses: the lenses that are sought, and the height of the ridge, the last."""
+    lenses = [
+        parameter
+        for number, (one, candidate) in enumerate(zip(sought, candidates, strict=True))
+        if one.is_lens_sought
+        for parameter in free_lens(number, candidate.camera)
+    ]
+    return [*lenses, *free_ridge(field)]
 
 
 def _rms(candidates: Sequence[Candidate]) -> float:

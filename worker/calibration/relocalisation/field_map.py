@@ -1,6 +1,6 @@
 """Maps of a field's markings for a search over all poses: points to project, and distances on the ground."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import cv2
@@ -19,6 +19,7 @@ class FieldMap:
     `nearest` (rows, columns, 2): from the nearest paint to each cell of the ground, m; the cell of row 0, column 0 has
     its centre at `origin` (2,) m and cells are `cell_m` wide. `lines_along_x`: y (m) of the straight lines that run
     along x; `lines_along_y`: x (m) of those along y; `between_circles` (R, 2) m: from each to others of its size.
+    `every`: the points are one in so many of those of the whole map.
     """
 
     points: NDArray[np.float32]
@@ -30,6 +31,7 @@ class FieldMap:
     lines_along_y: Array
     between_circles: Array
     half_size: Array
+    every: int = 1
 
     @classmethod
     def of(cls, field: Field) -> "FieldMap":
@@ -72,6 +74,13 @@ class FieldMap:
         # `take` from a flat array is ten times as fast as two indices.
         vectors = self.nearest.reshape(-1, 2).take(row * columns + column, axis=0)
         return np.moveaxis(vectors, -1, 0), within
+
+    @cached_property
+    def thinned(self) -> "FieldMap":
+        """The map with every fourth of its points, to rank many hypotheses by."""
+        at = np.arange(0, len(self.points) - 4, 4)
+        joined = np.logical_and.reduce([self.joined[at + ahead] for ahead in range(4)])
+        return replace(self, points=self.points[at], joined=joined, every=4 * self.every)
 
     @cached_property
     def is_symmetric(self) -> bool:

@@ -1,6 +1,6 @@
 """Lines of a frame as its lens lays them out: segments, places on paint, distances to paint."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import cv2
@@ -78,6 +78,11 @@ class LineView:
             ends,
             float(np.radians(roll_sigma_deg)),
         )
+
+    @property
+    def thinned(self) -> "LineView":
+        """The view with a quarter of its places on paint, to rank many hypotheses by."""
+        return replace(self, places=self.places[::4])
 
     @property
     def lengths(self) -> Array:

@@ -12,6 +12,7 @@ import numpy as np
 
 from worker.calibration.detection.contrast import Channels
 from worker.calibration.diagnostics.registration import Response
+from worker.calibration.gate.quality import ground_left_open
 from worker.calibration.geometry.camera import Camera, Pose, inside
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.lens import Lens
@@ -40,10 +41,9 @@ did by 0.12."""
 MORE_EXPLAINED = 0.05
 """Share of the paint by which one of two poses explains more than the other."""
 LEAST_SURE = 0.0025
-"""Largest standard deviation (rms) of the markings in view by the best pose, as a part of the width of the frame,
-through a lens that is known; half of it through one that is found. Pose and lens that slide together, one to make up
-for the other, keep every limit of a pose alone. Right ones on rendered views are sure to 0.0012 and better where the
-lens is found, wrong ones to 0.006 and worse."""
+"""Largest standard deviation (rms) of the markings in view by all that the lines leave open of pose and lens, as a part
+of the width of the frame. Right poses of rendered views are sure to 0.0012 and better, wrong ones to 0.006 and worse;
+lens and pose that slide together, one to make up for the other, keep every limit of a pose alone."""
 
 Reason = Literal["no-lines", "lines", "few-lines", "implausible", "not-unique", "not-confirmed"]
 
@@ -88,6 +88,7 @@ def relocalise(
     farther = 2 if sought.is_lens_sought else REFINED
     for attempt in range(3):
         pulse()
+        best_before = next(iter(candidates), None)
         proposals = [
             one for one in propose(markings, looked.small, through, seed + attempt) if one.agreement >= least_agreement
         ]
@@ -111,12 +112,19 @@ def relocalise(
         reasons = BEGUN_ANEW_WITH_OTHER_LENSES if sought.other_lenses else BEGUN_ANEW
         if found.refusal is None or found.refusal.reason not in reasons:
             break
+        if attempt > 0 and next(iter(candidates), None) is best_before:
+            # Two searches with draws of their own that end at the same best pose have missed none.
+            break
         if sought.other_lenses:
             through = replace(sought, lenses=sought.other_lenses)
         if found.refusal.reason in TOO_LITTLE_PAINT or attempt > 0:
             # Then faint paint is paint as well, and so is more that is none.
             looked = observed.strengthened(1.6)
-    return found
+    if found.refusal is not None or not sought.is_lens_sought:
+        return found
+    # The lens that was found is stored and stays; a pose is refined again by every calibration.
+    best, *others = found.candidates
+    return replace(found, candidates=[observed.settled(best.camera, sought), *others])
 
 
 def _to_choose_from(field: Field, markings: FieldMap, candidates: Sequence[Candidate]) -> list[Candidate]:
@@ -162,24 +170,14 @@ def why_not_taken(
             f"sees, at least {LEAST_OVERLAP:.0%} are needed; are sport and measures of the field right, is the view "
             "free?",
         )
-    if best.residual_px is None or best.sigma is None:
+    if best.residual_px is None or best.ground_sigma is None:
         return NotFound("few-lines", "too few points of lines could be measured; is the view free and lit?")
-    width = best.camera.intrinsics.size[0]
-    least_sure_px = width * (LEAST_SURE / 2 if sought.is_lens_sought else LEAST_SURE)
-    if best.shift_px is not None and best.shift_px > least_sure_px:
-        off = (
-            f"the markings may lie {best.shift_px:.1f} pixels from where the best pose puts them (at most "
-            f"{least_sure_px:.1f} allowed)"
-        )
-        if not sought.is_lens_sought:
-            return NotFound(
-                "few-lines", f"the lines in view leave the pose open: {off}; let the camera see more of the field"
-            )
-        return NotFound(
-            "few-lines",
-            f"the lines in view do not tell lens and pose apart: {off}; say what the lens or its field of view is, or "
-            "let the camera see more of the field",
-        )
+    if (left_open := _left_open(best)) is not None:
+        lines, advice = "leave the pose open", "let the camera see more of the field"
+        if sought.is_lens_sought:
+            lines = "do not tell lens and pose apart"
+            advice = f"say what the lens or its field of view is, or {advice}"
+        return NotFound("few-lines", f"the lines in view {lines}: {left_open}; {advice}")
     if sought.is_lens_sought and not sees_all_of_its_frame(best.camera.intrinsics):
         return NotFound(
             "implausible",
@@ -196,6 +194,15 @@ def why_not_taken(
             "are seen where they put them; say where the camera stands, or let it see more of the field",
         )
     return None
+
+
+def _left_open(best: Candidate) -> str | None:
+    """Return in words how far off the markings in view may be in the picture or on the ground; None if little."""
+    assert best.ground_sigma is not None
+    sure_px, most_px = best.ground_sigma.rms_px, LEAST_SURE * best.camera.intrinsics.size[0]
+    if sure_px > most_px:
+        return f"they may lie {sure_px:.1f} pixels from where the best pose puts them (at most {most_px:.1f} allowed)"
+    return ground_left_open(best.ground_sigma)
 
 
 def rivals(field: Field, markings: FieldMap, best: Candidate, others: Iterable[Candidate]) -> Iterator[Candidate]:

@@ -27,7 +27,7 @@ from worker.calibration.gate.quality import GATE
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.parameters import free_focal_lengths, free_ridge, lens_parameters
 from worker.calibration.geometry.rotation import rotation_angles_deg
-from worker.calibration.refinement.refine import LineReader, Observations, evaluate_poses, refine
+from worker.calibration.refinement.refine import LineReader, Observations, evaluate_poses, refine, refine_coarsely
 from worker.calibration.robust import huber_weights, tukey_weights
 
 pytestmark = pytest.mark.slow
@@ -141,6 +141,14 @@ class _CountingReader(LineReader):
     def read_anew(self):
         self.times += 1
         super().read_anew()
+
+
+def test_a_coarse_refinement_ends_where_a_settled_one_does_to_a_part_of_its_sigma():
+    coarse = refine_coarsely(CROWNED, a_little_off()[:1], pair_observed().of([0])).each[0]
+    settled = refine(CROWNED, a_little_off()[:1], pair_observed().of([0]), 0.5).each[0]
+    assert coarse.camera.distance_m(settled.camera) < 0.3 * settled.sigma.position_m
+    assert coarse.residual_px == pytest.approx(settled.residual_px, rel=0.1)
+    assert coarse.sigma.position_m == pytest.approx(settled.sigma.position_m, rel=0.1)
 
 
 def test_frames_are_not_read_again_and_again_for_a_pose_that_misses_most_lines():

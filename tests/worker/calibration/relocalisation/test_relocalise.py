@@ -18,6 +18,7 @@ from worker.calibration.relocalisation import relocalise as relocalisation
 from worker.calibration.relocalisation.candidate import Candidate, is_better
 from worker.calibration.relocalisation.field_map import FieldMap
 from worker.calibration.relocalisation.line_view import LineView
+from worker.calibration.relocalisation.propose import ProposedCamera
 from worker.calibration.relocalisation.relocalise import (
     explains_nearly_as_well,
     relocalise,
@@ -125,7 +126,7 @@ def test_three_lines_do_not_tell_a_lens_and_are_refused_with_the_pixels_that_it_
     court = field("padel")
     corner = camera("one", (5.3, -8.8, 7.2), (-1.0, 4.0), focal=700.0)
     answer = search(court, corner, paint_frame(court, corner), lens_is_known=False)
-    assert answer.candidates[0].shift_px > 1.2
+    assert answer.candidates[0].ground_sigma.rms_px > 2.4
     assert answer.refusal.reason == "few-lines"
     assert "do not tell lens and pose apart" in answer.refusal.words
 
@@ -143,6 +144,19 @@ def test_a_yard_line_too_far_is_left_for_the_true_one():
     truth = camera("one", (15.0, -44.0, 22.0), (35.0, -10.0), focal=900.0)
     answer = search(pitch, truth, paint_frame(pitch, truth))
     assert off_px(pitch, truth, answer.candidates[0].camera) < 0.5
+
+
+def test_a_search_ends_where_a_second_one_finds_no_better_pose(monkeypatch):
+    seeds = list[int]()
+
+    def propose_the_same(markings, response, sought, seed):
+        seeds.append(seed)
+        return [ProposedCamera(SIDELINE.intrinsics, BEHIND_A_GOAL.pose, 0.3)]
+
+    monkeypatch.setattr(relocalisation, "propose", propose_the_same)
+    answer = search(PITCH, SIDELINE, paint_frame(PITCH, SIDELINE))
+    assert answer.refusal.reason == "lines"
+    assert seeds == [1, 2]
 
 
 def test_a_frame_without_lines_finds_nothing_and_says_so():

@@ -9,7 +9,7 @@ import pytest
 from testbed.synthetic import PITCH, camera, moved, paint_frame, pair, worn
 from tests.worker.calibration.gate.good_result import seen
 from worker.calibration.diagnostics.overlap import Overlap
-from worker.calibration.refinement.uncertainty import Sigma
+from worker.calibration.refinement.uncertainty import GroundSigma, Sigma
 from worker.calibration.relocalisation.candidate import Candidate
 from worker.calibration.relocalisation.field_map import FieldMap
 from worker.calibration.relocalisation.relocalise import NotFound, Relocalisation, twin
@@ -21,12 +21,13 @@ from worker.calibration.relocalisation.sought import ANYWHERE, Place, SoughtCame
 LEFT, RIGHT = (one.resized(480) for one in pair())
 FAR_RIGHT = camera("far right", (8.0, -48.0, 10.0), (55.0, -12.0)).resized(480)
 CAMERAS = (LEFT, RIGHT, FAR_RIGHT)
+SURE_OF_THE_GROUND = GroundSigma(np.full(9, 0.01), np.full(9, 0.1))
 NOT_UNIQUE = NotFound("not-unique", "two poses explain the lines")
 
 
 def candidate(one, found_of_100=95):
     evidence, overlap = seen(found_of_100 / 100, by_chance=0.0), Overlap(0.8, found_of_100 / 100, 0.0)
-    return Candidate(one, 0.9, np.ones(100, bool), evidence, overlap, 0.3, Sigma(0.01, 0.01), 0.1)
+    return Candidate(one, 0.9, np.ones(100, bool), evidence, overlap, 0.3, Sigma(0.01, 0.01), SURE_OF_THE_GROUND)
 
 
 def slid(one, by_m=18.0):
