@@ -10,6 +10,7 @@ from testbed import synthetic
 from testbed.synthetic import CROWNED, PITCH, moved, paint_frame, pair, pair_frames, worn
 from tests.worker.calibration.gate.good_result import good
 from tests.worker.calibration.outdated_pair import white_on_green
+from worker.calibration.calibrate import calibrate
 from worker.calibration.find_cameras import FoundCamera, find_cameras, why_lens_unfit, why_not_confirmed
 from worker.calibration.gate.quality import GATE
 from worker.calibration.geometry.parameters import with_focal_length
@@ -153,6 +154,22 @@ def test_a_lens_that_was_given_and_does_not_fit_is_said_and_nothing_is_found():
 def test_a_lens_that_may_be_off_by_more_than_a_first_position_says_so():
     loose = replace(good(), covariance=np.diag([1e-4**2] * 3 + [0.3**2] * 3))
     assert "say how well it is known (sigma)" in why_lens_unfit(loose, [])
+
+
+def test_a_given_lens_that_leaves_the_place_open_is_replaced_before_the_only_calibration(monkeypatch):
+    calibrations = []
+
+    def counted(*arguments, **named):
+        calibrations.append(calibrate(*arguments, **named))
+        return calibrations[-1]
+
+    monkeypatch.setattr("worker.calibration.find_cameras.calibrate", counted)
+    monkeypatch.setattr("worker.calibration.find_cameras.GATE", replace(GATE, largest_found_sigma_m=0.01))
+    left = pair()[0]
+    (found,) = find_cameras(CROWNED, [sought(left)], [], {left.id: frames()[left.id]}, white_on_green, 1).cameras
+    assert found.accepted, found.refusal
+    assert any("leaves open where the camera stands" in remark for remark in found.remarks)
+    assert len(calibrations) == 1
 
 
 @pytest.mark.long
