@@ -42,7 +42,7 @@ Seen = tuple[Channels, NDArray[np.float32]]
 SEGMENTED, SEARCHED = 0.05, 0.95
 """Share of the whole at which the frames are segmented, and the cameras found; to calibrate them is the rest. Of two
 cameras of which nothing was known (66 core-seconds) they were 0.02 and 0.95."""
-USUAL_CORE_S, USUAL_CORE_S_KNOWN_LENS = 12.5, 7.5
+USUAL_CORE_S, USUAL_CORE_S_KNOWN_LENS = 7.5, 5.0
 """Core-seconds that the search of a camera takes, nothing known of it or its lens: means of 66 real frames each."""
 
 
@@ -137,33 +137,25 @@ def find_cameras(
         with progress.timed("refinement"):
             pitch, placed = _on_its_crown(pitch, placed, by_id, seen)
 
-    # Calibrate those that were found, as every later job will; those whose lines contradict the lens that was given
-    # once more, through the lens that the lines have.
+    # Calibrate those that were found, as every later job will, until none has a given lens that its lines contradict:
+    # the lens that the lines have takes its place.
     remembered = _Remembered(segment, {id(frames[one][n]): r for one in placed for n, r in enumerate(responses[one])})
     beside = [camera for camera in known if camera.id in frames]
-
-    def calibrated_where_found() -> Calibration | None:
-        found = [one.candidates[0].camera for one in placed.values() if one.refusal is None]
-        if not found:
-            return None
-        progress.at_fraction("refinement", SEARCHED)
-        options = Options(seed=seed, recover="never")
-        return calibrate(pitch, [*found, *beside], frames, remembered, options, stop=stop)
-
-    def take_lenses_of_lines(unfit: Mapping[str, str]) -> None:
-        for camera, words in unfit.items():
-            by_id[camera] = replace(by_id[camera], lenses=[SoughtLens.around(by_id[camera].lenses[0].lens, LENS_OFF)])
-            placed[camera] = _through_lens_of_lines(pitch, markings, by_id[camera], placed[camera], seen[camera], words)
-
+    options = Options(seed=seed, recover="never")
     with progress.timed("calibration"):
-        take_lenses_of_lines(_with_loose_lenses(sought, placed))
-        calibrated = calibrated_where_found()
-        unfit = {} if calibrated is None else _with_unfit_lenses(by_id.values(), calibrated)
-        take_lenses_of_lines(unfit)
-        if unfit:
-            calibrated = calibrated_where_found()
+        unfit = _with_loose_lenses(by_id.values(), placed)
+        while True:
+            for camera, words in unfit.items():
+                one = replace(by_id[camera], lenses=[SoughtLens.around(by_id[camera].lenses[0].lens, LENS_OFF)])
+                placed[camera] = _through_lens_of_lines(pitch, markings, one, placed[camera], seen[camera], words)
+                by_id[camera] = one
+            progress.at_fraction("refinement", SEARCHED)
+            found = [one.candidates[0].camera for one in placed.values() if one.refusal is None]
+            calibrated = calibrate(pitch, [*found, *beside], frames, remembered, options, stop=stop) if found else None
+            unfit = {} if calibrated is None else _with_unfit_lenses(by_id.values(), calibrated)
+            if not unfit:
+                break
     judged = [_judged(camera, placed[camera.id], calibrated) for camera in by_id.values()]
-    found = [one.candidates[0].camera for one in placed.values() if one.refusal is None]
     is_side_assumed = markings.is_symmetric and not known and all(by_id[one.id].place.is_anywhere for one in found)
     return FoundCameras(
         pitch,
