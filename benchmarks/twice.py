@@ -165,7 +165,8 @@ def _life(focal: float, view: str, mistake: Mistake) -> list[Answer]:
         freed = refine(mistake.pitch, [found], sight, 0.0, free_lens(0, found)).each[0]
         found = with_sigmas(freed)
         (result,) = Installation(mistake.pitch, [found]).night(sight)
-        is_sure = freed.ground_sigma is not None and freed.ground_sigma.rms_px <= LEAST_SURE * found.intrinsics.size[0]
+        most_px = LEAST_SURE / 2 * found.intrinsics.size[0]
+        is_sure = freed.ground_sigma is not None and freed.ground_sigma.rms_px <= most_px
         result = result if is_sure else replace(result, refusal=Refusal("undetermined", "lens and pose slide together"))
     is_found = result.accepted
     answer = Answer.of(result, real)

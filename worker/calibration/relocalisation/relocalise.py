@@ -41,9 +41,10 @@ did by 0.12."""
 MORE_EXPLAINED = 0.05
 """Share of the paint by which one of two poses explains more than the other."""
 LEAST_SURE = 0.0025
-"""Largest standard deviation (rms) of the markings in view by all that the lines leave open of pose and lens, as a part
-of the width of the frame. Right poses of rendered views are sure to 0.0012 and better, wrong ones to 0.006 and worse;
-lens and pose that slide together, one to make up for the other, keep every limit of a pose alone."""
+"""Largest standard deviation (rms) of the markings in view by the best pose, as a part of the width of the frame,
+through a lens that is known; half of it through one that is found. Pose and lens that slide together, one to make up
+for the other, keep every limit of a pose alone. Right ones on rendered views are sure to 0.0012 and better where the
+lens is found, wrong ones to 0.0016 and worse."""
 
 Reason = Literal["no-lines", "lines", "few-lines", "implausible", "not-unique", "not-confirmed"]
 
@@ -172,7 +173,7 @@ def why_not_taken(
         )
     if best.residual_px is None or best.ground_sigma is None:
         return NotFound("few-lines", "too few points of lines could be measured; is the view free and lit?")
-    if (left_open := _left_open(best)) is not None:
+    if (left_open := _left_open(best, sought)) is not None:
         lines, advice = "leave the pose open", "let the camera see more of the field"
         if sought.is_lens_sought:
             lines = "do not tell lens and pose apart"
@@ -196,10 +197,11 @@ def why_not_taken(
     return None
 
 
-def _left_open(best: Candidate) -> str | None:
+def _left_open(best: Candidate, sought: SoughtCamera) -> str | None:
     """Return in words how far off the markings in view may be in the picture or on the ground; None if little."""
     assert best.ground_sigma is not None
-    sure_px, most_px = best.ground_sigma.rms_px, LEAST_SURE * best.camera.intrinsics.size[0]
+    least_sure = LEAST_SURE / 2 if sought.is_lens_sought else LEAST_SURE
+    sure_px, most_px = best.ground_sigma.rms_px, least_sure * best.camera.intrinsics.size[0]
     if sure_px > most_px:
         return f"they may lie {sure_px:.1f} pixels from where the best pose puts them (at most {most_px:.1f} allowed)"
     return ground_left_open(best.ground_sigma)
