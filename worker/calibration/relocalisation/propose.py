@@ -10,7 +10,8 @@ from worker.calibration.geometry.camera import Array, Pose
 from worker.calibration.geometry.lens import Lens
 from worker.calibration.geometry.rotation import rotation_vectors
 from worker.calibration.relocalisation.agreement import agreement
-from worker.calibration.relocalisation.climbing import LEVELS, climb
+from worker.calibration.relocalisation.climbing import LEVELS, ClimbingRound, climb
+from worker.calibration.relocalisation.drawing import draw, draw_at
 from worker.calibration.relocalisation.field_map import FieldMap
 from worker.calibration.relocalisation.hypotheses import (
     FOCAL_SOUGHT,
@@ -45,12 +46,15 @@ def propose(field: FieldMap, response: NDArray[np.uint8], sought: SoughtCamera, 
     On a field that looks the same turned by half a turn, one of each two cameras, at a place where it may stand.
     """
     rng = np.random.default_rng(seed)
+    # Agreement of a pose found from lines, through its lens, that is better than any draw or another lens leads to.
+    convincing = 0.45
     searches = list[_Search]()
     for lens, view in _views(response, sought):
         searches.append(_Search.by_lines(field, view, lens, sought.place, rng))
-        # Agreement of a pose that is better than any that another lens leads to.
-        if searches[-1].best >= 0.45:
+        if searches[-1].best >= convincing:
             break
+    else:
+        searches = [search.with_draws(rng) for search in searches]
     proposals = [one for search in searches for one in search.with_repeated_markings(rng).proposals()]
     return sorted(proposals, key=lambda one: -one.agreement)
 
@@ -99,12 +103,18 @@ class _Search:
         """Return the best agreement."""
         return float(self.scores.max(initial=0.0))
 
+    def with_draws(self, rng: np.random.Generator) -> "_Search":
+        """Climb from what was found and from cameras drawn at random."""
+        drawn = _drawn(self.field, focal_lengths(self.view, self.lens), self.view.roll_sigma, self.place, rng)
+        return self._climbed(_best(self.field, self.view, drawn, 10.0, 120), LEVELS, rng)
+
     def with_repeated_markings(self, rng: np.random.Generator) -> "_Search":
         """Climb from what was found and from what looks alike where markings are repeated."""
-        levels = LEVELS[-2:]
         slid = _at(self.place, self.field, slid_along_field(self.field, self.found))
-        alike = _best(self.field, self.view, slid, levels[0].tolerance_px, 6)
-        start = Hypotheses.joined([self.found, alike])
+        return self._climbed(_best(self.field, self.view, slid, LEVELS[-2].tolerance_px, 6), LEVELS[-2:], rng)
+
+    def _climbed(self, more: Hypotheses, levels: Sequence[ClimbingRound], rng: np.random.Generator) -> "_Search":
+        start = Hypotheses.joined([self.found, more])
         found, scores = climb(self.field, self.view, start, _steps(self.lens), rng, levels)
         return replace(self, found=found, scores=scores)
 
@@ -134,6 +144,14 @@ def _by_lines(
     """Return the cameras that look in these directions and that assignments of lines to markings lead to."""
     most = 220 if lens.is_known else 120
     return _at(place, field, Hypotheses.joined([positions(field, view, one, most) for one in directions]))
+
+
+def _drawn(field: FieldMap, focal: Array, roll_sigma: float, place: Place, rng: np.random.Generator) -> Hypotheses:
+    """Draw cameras at random: where they are known to stand, or else from where fields are filmed."""
+    if place.position is None:
+        return _at(place, field, draw(field, focal, roll_sigma, 20000, rng))
+    drawn = draw_at(field, focal, roll_sigma, place.position, place.radius_m, 6000, rng)
+    return _at(place, field, drawn)
 
 
 def _with_neighbours(directions: list[Direction], rng: np.random.Generator) -> list[Direction]:

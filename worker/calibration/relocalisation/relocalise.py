@@ -28,7 +28,7 @@ from worker.calibration.relocalisation.sought import SoughtCamera
 TOO_LITTLE_PAINT = frozenset({"no-lines", "few-lines"})
 BEGUN_ANEW = TOO_LITTLE_PAINT | {"lines"}
 BEGUN_ANEW_WITH_OTHER_LENSES = BEGUN_ANEW | {"implausible", "not-unique"}
-"""Reasons after which the search begins anew with other random numbers, through other lenses if there are any."""
+"""Reasons after which the search begins anew with other draws, through other lenses if there are any."""
 REFINED = 4
 """Most proposals that are refined."""
 DIFFERENT = 0.01
@@ -114,7 +114,7 @@ def relocalise(
         if found.refusal is None or found.refusal.reason not in reasons:
             break
         if attempt > 0 and next(iter(candidates), None) is best_before:
-            # Two searches with random numbers of their own that end at the same best pose have missed none.
+            # Two searches with draws of their own that end at the same best pose have missed none.
             break
         if sought.other_lenses:
             through = replace(sought, lenses=sought.other_lenses)
