@@ -10,14 +10,13 @@ import argparse
 import os
 from collections.abc import Callable
 
-from benchmarks.service import endurance, fleet, kills, lists, load
+from benchmarks.service import endurance, fleet, kills, load
 
 SECTIONS: dict[str, Callable[[argparse.Namespace], list[str]]] = {
     "kills": kills.table,
     "takeovers": kills.takeovers,
     "pollers": load.table,
     "longrun": endurance.table,
-    "lists": lists.table,
     "fleet": fleet.table,
 }
 
@@ -32,7 +31,6 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=7, help="jobs alone and jobs with pollers, alternately")
     parser.add_argument("--jobs", type=int, default=500, help="in a row, through the stub of the engine")
     parser.add_argument("--real-jobs", type=int, default=100, help="in a row, through the engine, at reduced size")
-    parser.add_argument("--listed-jobs", type=int, default=40_000, help="among which lists find theirs")
     parser.add_argument("--fleet-days", type=int, default=30, help="of a fleet in fast motion")
     parser.add_argument("--fleet-jobs", type=int, default=200, help="on each of these days")
     options = parser.parse_args()
