@@ -303,8 +303,11 @@ def _on_its_crown(
 
 def _with_loose_lenses(sought: Iterable[SoughtCamera], placed: Mapping[str, Relocalisation]) -> dict[str, str]:
     """Return the cameras that were found and whose given lens leaves open where they stand, and the words for it."""
-    found = {one.id: placed[one.id].candidates[0].sigma for one in sought if placed[one.id].refusal is None}
-    loose = {one.id: why_lens_loose(found.get(one.id)) for one in sought if not one.is_lens_sought}
+    loose = {
+        one.id: why_lens_loose(placed[one.id].candidates[0].sigma)
+        for one in sought
+        if not one.is_lens_sought and placed[one.id].refusal is None
+    }
     return {camera: words for camera, words in loose.items() if words is not None}
 
 

@@ -151,6 +151,11 @@ def test_a_lens_that_was_given_and_does_not_fit_is_said_and_nothing_is_found():
     assert "1.20 m from where it seems to be: the lens that the lines have is taken in its place" in told
 
 
+def test_a_lens_that_may_be_off_by_more_than_a_first_position_says_so():
+    loose = replace(good(), covariance=np.diag([1e-4**2] * 3 + [0.3**2] * 3))
+    assert "say how well it is known (sigma)" in why_lens_unfit(loose, [])
+
+
 def test_a_given_lens_that_leaves_the_place_open_is_replaced_before_the_only_calibration(monkeypatch):
     calibrations = []
 

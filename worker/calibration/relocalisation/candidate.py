@@ -67,12 +67,12 @@ class FrameObservations:
 
     def candidate(self, camera: Camera, sought: SoughtCamera) -> Candidate:
         """Refine a proposed camera coarsely onto the measured lines close by, with its lens if that is sought."""
-        lens = free_lens(0, camera) if sought.is_lens_sought else []
+        lens = free_lens_if_sought(0, camera, sought)
         return self.assessed(refine_coarsely(self.field, [camera], self.observations, lens).each[0], sought)
 
     def settled(self, camera: Camera, sought: SoughtCamera) -> Candidate:
         """Refine a camera until it stands still, with its lens if that is sought."""
-        lens = free_lens(0, camera) if sought.is_lens_sought else []
+        lens = free_lens_if_sought(0, camera, sought)
         return self.assessed(refine(self.field, [camera], self.observations, 0.0, lens).each[0], sought)
 
     def on_lines_farther_off(self, camera: Camera, close: Candidate, sought: SoughtCamera) -> Candidate:
@@ -112,6 +112,11 @@ def is_better(one: Candidate, other: Candidate) -> bool:
     if abs(more) > 0.03 or one.residual_px is None or other.residual_px is None:
         return more > 0
     return one.residual_px < other.residual_px
+
+
+def free_lens_if_sought(number: int, camera: Camera, sought: SoughtCamera) -> list[LensParameter]:
+    """Return `free_lens` of a camera whose lens is sought; nothing for one whose lens was given."""
+    return free_lens(number, camera) if sought.is_lens_sought else []
 
 
 def free_lens(number: int, camera: Camera) -> list[LensParameter]:

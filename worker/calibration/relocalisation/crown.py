@@ -14,7 +14,7 @@ from worker.calibration.gate.quality import GATE
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.parameters import Parameter, free_ridge
 from worker.calibration.refinement.refine import Observations, refine, refine_coarsely
-from worker.calibration.relocalisation.candidate import Candidate, FrameObservations, free_lens
+from worker.calibration.relocalisation.candidate import Candidate, FrameObservations, free_lens_if_sought
 from worker.calibration.relocalisation.sought import SoughtCamera
 
 
@@ -53,8 +53,7 @@ def _free(field: Field, sought: Sequence[SoughtCamera], candidates: Sequence[Can
     lenses = [
         parameter
         for number, (one, candidate) in enumerate(zip(sought, candidates, strict=True))
-        if one.is_lens_sought
-        for parameter in free_lens(number, candidate.camera)
+        for parameter in free_lens_if_sought(number, candidate.camera, one)
     ]
     return [*lenses, *free_ridge(field)]
 
