@@ -91,14 +91,19 @@ def _require_keys_if_exposed(settings: Settings, keys: KeyRepository) -> None:
 def _listen(settings: Settings) -> list[socket.socket]:
     if settings.host != EVERYWHERE:
         return [_listener(settings.host, settings.port)]
-    listeners = [_listener(EVERYWHERE, settings.port)]
-    port = listeners[0].getsockname()[1]
+    over_ipv6 = _listener(EVERYWHERE, settings.port)
     try:
         # One socket for both would name clients of IPv4 ::ffff:10.1.0.5, which no limit and no log is about.
-        listeners.append(_listener(EVERYWHERE_IPV4, port))
+        return [over_ipv6, _listener(EVERYWHERE_IPV4, over_ipv6.getsockname()[1])]
     except _NoSuchFamily:
         log.warning("this machine has no IPv4, listening on IPv6 alone")
-    return listeners
+        return [over_ipv6]
+    except CannotListen:
+        over_ipv6.close()
+        if settings.port:
+            raise
+    # The system chose a port that is free over IPv6 alone.
+    return _listen(settings)
 
 
 def _listener(host: str, port: int) -> socket.socket:

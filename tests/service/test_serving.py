@@ -101,3 +101,22 @@ def test_the_image_is_healthy_on_whatever_it_listens_and_both_versions_of_ip_are
         assert host != "::1" or not is_answered("127.0.0.1", port)
         assert health(host, port) == 0
     assert health(host, port) == 1
+
+
+def test_a_port_that_the_system_chose_and_ipv4_has_in_use_is_chosen_again(tmp_path, monkeypatch):
+    create_server = socket.create_server
+    taken = []
+
+    def create_and_take_first(address, **options):
+        opened = create_server(address, **options)
+        if not taken:
+            taken.append(create_server(("0.0.0.0", opened.getsockname()[1])))
+        return opened
+
+    monkeypatch.setattr(socket, "create_server", create_and_take_first)
+    listeners = serving._listen(Settings(data=tmp_path, host="::", port=0))
+    ports = {opened.getsockname()[1] for opened in listeners}
+    with taken[0], listeners[0], listeners[1]:
+        assert len(ports) == 1 and taken[0].getsockname()[1] not in ports
+        with pytest.raises(serving.CannotListen, match=f"0.0.0.0:{taken[0].getsockname()[1]}.*Address already in use"):
+            serving._listen(Settings(data=tmp_path, host="::", port=taken[0].getsockname()[1]))
