@@ -209,7 +209,8 @@ def _found(pitch: Field, truth: Camera, frame: Frame, knowing: str, seed: int, e
     found = find_cameras(pitch, [sought], [], {truth.id: [frame]}, engine.segment, seed)
     core_s = time.process_time() - cpu
     (camera,) = found.cameras
-    off_px = partial(mean_shift_px, pitch, FieldMap.of(pitch), truth, unseen_px=UNSEEN_PX)
+    # Where the ground was found with the camera, a marking lies where the two have it together.
+    off_px = partial(mean_shift_px, pitch, FieldMap.of(pitch), truth, unseen_px=UNSEEN_PX, as_other_has_it=found.pitch)
     off = off_px(camera.candidates[0].camera) if camera.candidates else float("inf")
     from_truth = engine(pitch, [truth], {truth.id: [frame]}, seed)
     return {

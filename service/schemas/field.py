@@ -180,7 +180,8 @@ class FieldOfPlay(Schema):
     measures_m: dict[str, Number] = Field({}, description="Other dimensions that the template lets you set, by name.")
     ridge: Annotated[list[Row], Field(min_length=2, max_length=2)] | None = Field(
         None,
-        description="Both ends of the ridge of a crowned surface, [x, y, z] in m, with one y and one z; null: flat.",
+        description="Both ends of the ridge of a crowned surface, [x, y, z] in m, with one y and one z; null: flat. A "
+        "goal line at which the ridge ends goes over the crown, as in most stadiums; every other one is level.",
     )
     uneven_m: Annotated[Number, Field(ge=0.001, le=0.1)] | None = Field(
         None,
@@ -260,7 +261,8 @@ class FieldOfPlay(Schema):
         (x1, y1, z1), (x2, y2, z2) = self.ridge
         if y1 != y2 or z1 != z2:
             raise ValueError("both ends of the ridge need the same y and the same z")
-        if max(abs(x1), abs(x2)) >= self.length_m / 2 or abs(y1) >= self.width_m / 2:
+        # Answers are rounded to a millimetre.
+        if max(abs(x1), abs(x2)) > self.length_m / 2 + 0.001 or abs(y1) >= self.width_m / 2:
             raise ValueError("the ridge must lie inside the pitch")
         if not 0 <= z1 <= 3:
             raise ValueError(f"the ridge must be 0 to 3 m high, not {z1:g} m")
@@ -275,18 +277,25 @@ class FieldOfPlay(Schema):
 
     def with_number(self, name: FieldNumber, value: float) -> "FieldOfPlay":
         """Return the field with another value of a dimension, m. Raises `ValidationError` if the sport forbids it."""
-        return self.changed({"ridge": self._ridge_at(value)} if name == "ridge_height_m" else {name: value})
+        if name == "ridge_height_m":
+            return self.changed({"ridge": self._ridge_at(value)})
+        return self.changed({name: value, "ridge": self._stretched_ridge(name, value / self.number(name))})
 
     def changed(self, values: dict[str, Any]) -> "FieldOfPlay":
         """Return the field with other values. Raises `ValidationError` if the sport forbids them."""
         return FieldOfPlay.model_validate(self.model_dump() | values)
 
     def _ridge_at(self, height_m: float) -> list[Row]:
-        """Return the ridge at another height; a flat field gets one between hips of 45°, as calibrations assume."""
+        """Return the ridge at another height; a flat field gets one from goal line to goal line, as calibrations do."""
         if self.ridge is not None:
             return [[x, y, height_m] for x, y, _ in self.ridge]
-        end = max((self.length_m - self.width_m) / 2, 0.0)
-        return [[0.0 - end, 0.0, height_m], [end, 0.0, height_m]]
+        end = self.length_m / 2
+        return [[-end, 0.0, height_m], [end, 0.0, height_m]]
+
+    def _stretched_ridge(self, name: FieldNumber, times: float) -> list[Row] | None:
+        """Return the ridge of the field with another length or width, stretched with it as calibrations do."""
+        along, across = (times, 1.0) if name == "length_m" else (1.0, times)
+        return None if self.ridge is None else [[along * x, across * y, z] for x, y, z in self.ridge]
 
     @property
     def warnings(self) -> list[str]:

@@ -117,6 +117,7 @@ def test_a_port_that_the_system_chose_and_ipv4_has_in_use_is_chosen_again(tmp_pa
     listeners = serving._listen(Settings(data=tmp_path, host="::", port=0))
     ports = {opened.getsockname()[1] for opened in listeners}
     with taken[0], listeners[0], listeners[1]:
-        assert len(ports) == 1 and taken[0].getsockname()[1] not in ports
+        assert len(ports) == 1
+        assert taken[0].getsockname()[1] not in ports
         with pytest.raises(serving.CannotListen, match=f"0.0.0.0:{taken[0].getsockname()[1]}.*Address already in use"):
             serving._listen(Settings(data=tmp_path, host="::", port=taken[0].getsockname()[1]))

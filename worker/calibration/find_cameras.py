@@ -133,12 +133,9 @@ def find_cameras(
         placed = _on_their_sides(alone, sought, known, ground) if markings.is_symmetric else alone
         by_id = {one.id: one for one in sought}
         placed = tell_rivals_apart(pitch, markings, placed, by_id, known, ground)
-    if pitch.ridge is None and not known:
-        with progress.timed("refinement"):
-            pitch, placed = _on_its_crown(pitch, placed, by_id, seen)
 
     # Calibrate those that were found, as every later job will, until none has a given lens that its lines contradict:
-    # the lens that the lines have takes its place.
+    # the lens that the lines have takes its place, and tells more of the crown.
     remembered = _Remembered(segment, {id(frames[one][n]): r for one in placed for n, r in enumerate(responses[one])})
     beside = [camera for camera in known if camera.id in frames]
     options = Options(seed=seed, recover="never")
@@ -149,6 +146,8 @@ def find_cameras(
                 one = replace(by_id[camera], lenses=[SoughtLens.around(by_id[camera].lenses[0].lens, LENS_OFF)])
                 placed[camera] = _through_lens_of_lines(pitch, markings, one, placed[camera], seen[camera], words)
                 by_id[camera] = one
+            if pitch.ridge is None and not known:
+                pitch, placed = _on_its_crown(pitch, placed, by_id, seen)
             progress.at_fraction("refinement", SEARCHED)
             found = [one.candidates[0].camera for one in placed.values() if one.refusal is None]
             calibrated = calibrate(pitch, [*found, *beside], frames, remembered, options, stop=stop) if found else None

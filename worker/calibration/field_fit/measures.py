@@ -77,7 +77,7 @@ def fit_field(
 ) -> FieldFit:
     """Fit length, width and ridge of a pitch to its lines in the frames of several cameras.
 
-    Arguments, errors and determinism as of `calibrate`. Where the pitch has no ridge, one with hips of 45° is tried.
+    Arguments, errors and determinism as of `calibrate`. Where the pitch has no ridge, ridges of all lengths are tried.
     """
     options, progress = Options(seed=seed), ProgressReporter(report, stop)
     observer = FrameObserver.of(pitch, cameras, frames, segment)

@@ -20,8 +20,8 @@ from worker.calibration.refinement.uncertainty import RefinedPoses
 from worker.calibration.refinement.unknowns import Unknowns
 from worker.calibration.robust import TUKEY, robust_scale, tukey_loss, tukey_weights
 
-LENGTHS = 10
-"""Number of lengths that are tried, from none by equal parts of the field's length: the grid on which its flat
+PARTS = 10
+"""Parts of the field's length by which the lengths differ that are tried, from none to all: the grid on which its flat
 prior is summed. A football pitch has been tried every 10 m; no length is known more finely than the grid."""
 
 
@@ -35,7 +35,7 @@ class TriedRidge:
 
 @dataclass(frozen=True)
 class TriedRidges:
-    """Ridges of `LENGTHS` lengths that were `tried`. `held`: the field with its own length."""
+    """Ridges of the lengths that were `tried`. `held`: the field with its own length."""
 
     held: Field
     tried: Sequence[TriedRidge]
@@ -53,14 +53,15 @@ class TriedRidges:
 
     @property
     def best(self) -> float:
-        """Expected length."""
-        return float(self.credence @ self.lengths)
+        """The likeliest length. A mean of several could end beside a goal line, and drop that from the crown."""
+        return float(self.lengths[np.argmin(self._costs)])
 
     @property
     def sigma(self) -> float:
         """Standard deviation of the length; not less than the grid can tell."""
-        variance = float(self.credence @ (self.lengths - self.best) ** 2)
-        return float(np.sqrt(variance + (self.held.length / LENGTHS) ** 2 / 12))
+        mean = self.credence @ self.lengths
+        variance = float(self.credence @ (self.lengths - mean) ** 2)
+        return float(np.sqrt(variance + (self.held.length / PARTS) ** 2 / 12))
 
     @property
     def alike(self) -> tuple[float, float]:
@@ -88,7 +89,7 @@ def try_ridges(base: RefinedPoses, free: Sequence[Parameter], observations: Obse
     scale = robust_scale(rows.value)
     together = _together(rows, scale)
     tried = []
-    for length in np.linspace(0.0, base.pitch.length, LENGTHS, endpoint=False).tolist():
+    for length in np.linspace(0.0, base.pitch.length, PARTS + 1).tolist():
         there, rows_there = _fitted(base.pitch.with_ridge_length(length), base.cameras, measured, unknowns)
         away = there.change_from(base.cameras)
         loss = float(np.sum(tukey_loss(rows_there.value, scale))) + float(away @ there.prior(unknowns) @ away)

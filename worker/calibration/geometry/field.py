@@ -79,7 +79,8 @@ class LinePoints:
 class Field:
     """A field of a sport, a football pitch unless said; `measures`: what else its template leaves open, in metres.
 
-    `ridge`: the paper's p and p', (2, 3), same y and same z; None = flat. `stretched_from`: the field whose dashes its
+    `ridge`: the paper's p and p', (2, 3), same y and same z; None = flat. A goal line at which it ends goes over the
+    crown, as in stadiums; every other one is level. `stretched_from`: the field whose dashes its
     broken lines have, and whose points all its lines, as many and stretched with them. `others`: what else is painted
     there, of no use. `sigma`: how well numbers of it are known, m, by the names of `parameters.field_parameters`.
     """
@@ -95,13 +96,10 @@ class Field:
     sigma: Mapping[str, float] = field(default_factory=dict)
 
     def resized(self, *, length: float | None = None, width: float | None = None) -> "Field":
-        """Return the field with another length or width, point by point and with as many dashes."""
-        return replace(
-            self,
-            length=self.length if length is None else length,
-            width=self.width if width is None else width,
-            stretched_from=self._unstretched,
-        )
+        """Return the field with another length or width, point by point, ridge and all, and with as many dashes."""
+        length, width = self.length if length is None else length, self.width if width is None else width
+        ridge = None if self.ridge is None else self.ridge * [length / self.length, width / self.width, 1.0]
+        return replace(self, length=length, width=width, ridge=ridge, stretched_from=self._unstretched)
 
     def drawn_anew(self) -> "Field":
         """Return the field with as many dashes and points as fit on its lines."""
@@ -112,11 +110,15 @@ class Field:
         return replace(self, ridge=None)
 
     def raised(self, by: float) -> "Field":
-        """Return the field with its ridge raised by so many metres; a flat one gets a ridge between hips of 45°."""
+        """Return the field with its ridge raised by so many metres; a flat one gets one from goal line to goal line."""
         if self.ridge is not None:
             return replace(self, ridge=self.ridge + [0.0, 0.0, by])
-        end = max((self.length - self.width) / 2, 0.0)
+        end = self.length / 2
         return replace(self, ridge=np.array([[-end, 0.0, by], [end, 0.0, by]]))
+
+    def between_hips(self) -> "Field":
+        """Return the field with the ends of its ridge where hips of 45° have them, each as wide as half the field."""
+        return self.with_ridge_length(max(self.length - self.width, 0.0))
 
     @property
     def ridge_height(self) -> float:
@@ -136,12 +138,22 @@ class Field:
         assert raised.ridge is not None
         (start, end) = raised.ridge[np.argsort(raised.ridge[:, 0])]
         middle = (start[0] + end[0]) / 2
-        # Least distance of the ridge's ends from the goal lines: a roof has no upright sides.
-        half = min(max(length / 2, 0.0), self.length / 2 - abs(middle) - 0.5)
+        half = min(max(length / 2, 0.0), self.length / 2 - abs(middle))
         return replace(raised, ridge=np.array([[middle - half, *start[1:]], [middle + half, *end[1:]]]))
 
+    @property
+    def gables(self) -> tuple[bool, bool]:
+        """For the left and the right goal line: True if the ridge ends at it, to the width of its paint."""
+        if self.ridge is None:
+            return False, False
+        left, right = self.length / 2 + self.ridge[:, 0].min(), self.length / 2 - self.ridge[:, 0].max()
+        return bool(left < self.line_width), bool(right < self.line_width)
+
     def height(self, xy: Array) -> Array:
-        """Return the height (...) of the surface at (..., 2): the paper's four-plane hip roof; 0 off the field."""
+        """Return the height (...) of the surface at (..., 2): the paper's hip roof, 0 off the field.
+
+        Without the plane at a goal line at which the ridge ends; the ground goes on behind that.
+        """
         if self.ridge is None:
             return np.zeros(xy.shape[:-1])
         start, end = self.ridge[np.argsort(self.ridge[:, 0])]
@@ -149,15 +161,13 @@ class Field:
         half_length, half_width = self.length / 2, self.width / 2
         x, y = xy[..., 0], xy[..., 1]
         # Each plane goes through two corners at z = 0 and the ridge (or one of its ends): relative height 0..1.
-        planes = np.stack(
-            [
-                (half_width + y) / (half_width + ridge_y),
-                (half_width - y) / (half_width - ridge_y),
-                (half_length + x) / (half_length + start[0]),
-                (half_length - x) / (half_length - end[0]),
-            ]
-        )
-        return top * np.clip(planes.min(axis=0), 0.0, 1.0)
+        planes = [(half_width + y) / (half_width + ridge_y), (half_width - y) / (half_width - ridge_y)]
+        left_gable, right_gable = self.gables
+        if not left_gable:
+            planes.append((half_length + x) / (half_length + start[0]))
+        if not right_gable:
+            planes.append((half_length - x) / (half_length - end[0]))
+        return top * np.clip(np.min(planes, axis=0), 0.0, 1.0)
 
     def lift(self, xy: Array) -> Array:
         """Return points (..., 2) of the field lifted to its surface (..., 3)."""

@@ -275,7 +275,7 @@ def _ridge_height(pitch: Field, expected: float) -> FieldMeasure:
 
 
 def _length(pitch: Field, expected: float) -> FieldMeasure:
-    """Return the length of the field; its ridge keeps its own."""
+    """Return the length of the field."""
     measure = FieldMeasure("length_m", expected, lambda one: one.length, lambda one, now: one.resized(length=now))
     return measure.around(pitch)
 

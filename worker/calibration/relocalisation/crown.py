@@ -1,7 +1,8 @@
 """Crown of a field, found along with the cameras: grass lies on a roof, and a lens bends to make up for it.
 
 A site that says nothing of its ridge is searched as flat. Where all its cameras are found on that, their lines say
-together how high the ridge is, if there is one.
+together how high the ridge is, if there is one, and whether it ends at the goal lines, as in most stadiums, or between
+hips of 45°.
 """
 
 from collections.abc import Sequence
@@ -12,8 +13,9 @@ import numpy as np
 
 from worker.calibration.gate.quality import GATE
 from worker.calibration.geometry.field import Field
-from worker.calibration.geometry.parameters import Parameter, free_ridge
-from worker.calibration.refinement.refine import Observations, refine, refine_coarsely
+from worker.calibration.geometry.parameters import FREE_RIDGE_M, LensParameter, free_ridge
+from worker.calibration.refinement.refine import CLEARLY_MORE, SEARCH_PX, Observations, refine, refine_coarsely
+from worker.calibration.refinement.uncertainty import RefinedPose
 from worker.calibration.relocalisation.candidate import Candidate, FrameObservations, free_lens_if_sought
 from worker.calibration.relocalisation.sought import SoughtCamera
 
@@ -29,35 +31,44 @@ class CrownedField:
 def find_crown(
     flat: Field, sought: Sequence[SoughtCamera], candidates: Sequence[Candidate], observations: Observations
 ) -> CrownedField | None:
-    """Fit the height of a ridge to the lines of all cameras; return field and cameras with it, or None.
+    """Fit a ridge to the lines of all cameras; return field and cameras with it, or None.
 
     `candidates`: the result on the `flat` field for each camera that was `sought`; `observations`: of the same cameras.
     A lens that was given stays.
     """
-    found = refine_coarsely(flat, [one.camera for one in candidates], observations, _free(flat, sought, candidates))
+    cameras, lenses = [one.camera for one in candidates], _free_lenses(sought, candidates)
+    # A lens that has bent to the flat holds a free ridge down. So it bends to a low and a high crown first, whose lines
+    # lie farther from where the flat has them than an ordinary refinement looks.
+    roofs = [
+        roof.raised(height_m)
+        for roof in (flat.raised(0.0), flat.between_hips())
+        for height_m in (FREE_RIDGE_M / 2, FREE_RIDGE_M)
+    ]
+    bent = [refine_coarsely(roof, cameras, observations, lenses, (28.0, *SEARCH_PX)) for roof in roofs]
+    begun = min(bent, key=lambda one: np.nan_to_num(_rms(one.each), nan=np.inf))
+    found = refine(begun.pitch, begun.cameras, observations, 0.0, [*lenses, *free_ridge(begun.pitch)])
     height_m, sigma_m = found.pitch.ridge_height, found.parameter_uncertainties[-1].sigma
     # It is at least 5 cm high, and five of its standard deviations.
     if not max(0.05, 5.0 * sigma_m) < height_m < GATE.highest_ridge_m:
         return None
-    found = refine(found.pitch, found.cameras, observations, 0.0, _free(found.pitch, sought, candidates))
     observed = map(partial(FrameObservations.of, found.pitch), observations.channels, observations.responses)
     refined = [frame.assessed(pose, one) for frame, pose, one in zip(observed, found.each, sought, strict=True)]
+    lost = np.mean([before.agreement - now.agreement for before, now in zip(candidates, refined, strict=True)])
     # Largest ratio of the lines' rms distance from the cameras with a ridge to that on a flat field.
-    if not _rms(refined) < 0.85 * _rms(candidates):
+    if not _rms(refined) < 0.85 * _rms(candidates) or lost > CLEARLY_MORE:
         return None
     return CrownedField(found.pitch, refined)
 
 
-def _free(field: Field, sought: Sequence[SoughtCamera], candidates: Sequence[Candidate]) -> list[Parameter]:
-    """Return what is found along with the poses: the lenses that are sought, and the height of the ridge, the last."""
-    lenses = [
+def _free_lenses(sought: Sequence[SoughtCamera], candidates: Sequence[Candidate]) -> list[LensParameter]:
+    """Return the lenses that are sought, to be found along with the poses."""
+    return [
         parameter
         for number, (one, candidate) in enumerate(zip(sought, candidates, strict=True))
         for parameter in free_lens_if_sought(number, candidate.camera, one)
     ]
-    return [*lenses, *free_ridge(field)]
 
 
-def _rms(candidates: Sequence[Candidate]) -> float:
+def _rms(candidates: Sequence[Candidate] | Sequence[RefinedPose]) -> float:
     """Return the rms distance of the lines from the cameras, px; NaN where one was not measured."""
     return float(np.sqrt(np.mean([np.nan if one.residual_px is None else one.residual_px**2 for one in candidates])))

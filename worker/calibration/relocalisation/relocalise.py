@@ -286,20 +286,31 @@ def _differ(field: Field, markings: FieldMap, one: Camera, other: Camera, apart:
     return not mean_shift_px(field, markings, one, other, width) < apart * width
 
 
-def mean_shift_px(field: Field, markings: FieldMap, one: Camera, other: Camera, unseen_px: float) -> float:
+def mean_shift_px(
+    field: Field,
+    markings: FieldMap,
+    one: Camera,
+    other: Camera,
+    unseen_px: float,
+    *,
+    as_other_has_it: Field | None = None,
+) -> float:
     """Return the mean distance (px) of the markings in view of one camera by it and another; NaN without any.
 
     On a symmetric field it is the nearer of the other camera and its twin. Markings that that does not see count as
-    `unseen_px` off.
+    `unseen_px` off. `as_other_has_it`: the field on the ground that was found with the other camera.
     """
     lines = field.line_points().position
+    by_other = lines if as_other_has_it is None else as_other_has_it.lift(lines[:, :2])
     seen = one.project(lines)
     in_view = inside(seen, one.intrinsics.size)
     if not in_view.any():
         return float("nan")
     return min(
         float(
-            np.nan_to_num(np.linalg.norm(camera.project(lines[in_view]) - seen[in_view], axis=1), nan=unseen_px).mean()
+            np.nan_to_num(
+                np.linalg.norm(camera.project(by_other[in_view]) - seen[in_view], axis=1), nan=unseen_px
+            ).mean()
         )
         for camera in ([other, twin(other)] if markings.is_symmetric else [other])
     )

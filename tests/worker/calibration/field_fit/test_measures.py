@@ -46,7 +46,7 @@ def test_a_court_that_is_shorter_and_narrower_than_said_is_found():
     refined, measures = fitted(truth, [WHOLE_COURT], given)
     for name, real in (("length_m", 23.7), ("width_m", 10.9)):
         assert measures[name].known, name
-        assert abs(measures[name].value - real) < 3 * measures[name].sigma < 0.03, name
+        assert abs(measures[name].value - real) < 3 * measures[name].sigma < 0.05, name
     assert (refined.pitch.length, refined.pitch.width) == (measures["length_m"].value, measures["width_m"].value)
 
 
@@ -87,7 +87,7 @@ def test_a_flat_pitch_has_no_ridge_worth_mentioning_and_none_whose_length_could_
     assert abs(height.value) < 2 * height.sigma
     assert refined.pitch.ridge_height == pytest.approx(0.0, abs=0.03)
     assert not length.known
-    assert "from 0 to 94 m" in length.detail
+    assert "from 0 to 104 m" in length.detail
 
 
 def test_where_one_camera_sees_nothing_no_measure_is_known_and_it_alone_is_named():

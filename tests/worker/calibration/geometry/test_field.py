@@ -1,5 +1,7 @@
 """The pitch: markings by the Laws of the Game, and the roof."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -108,8 +110,19 @@ def test_a_ridge_gets_another_length_around_its_middle_as_far_as_there_is_room()
     assert (pitch.ridge_length, pitch.ridge_height) == (30.0, 0.3)
     assert pitch.with_ridge_length(10.0).ridge == pytest.approx(np.array([[0.0, 2.0, 0.3], [10.0, 2.0, 0.3]]))
     widest = pitch.with_ridge_length(500.0)
-    assert widest.ridge[:, 0] == pytest.approx([5.0 - 47.0, 5.0 + 47.0])
+    assert widest.ridge[:, 0] == pytest.approx([5.0 - 47.5, 5.0 + 47.5])
     assert PITCH.with_ridge_length(8.0).height(np.array([3.0, 5.0])) == 0.0
+
+
+def test_the_goal_lines_of_a_flat_field_that_is_raised_go_over_its_crown_and_stay_on_it_at_another_length():
+    raised = PITCH.raised(0.3)
+    for pitch in (raised, raised.resized(length=98.4, width=70.0), replace(raised, ridge=raised.ridge.round(1))):
+        x, y = pitch.length / 2, pitch.width / 2
+        along_the_goal_line = np.array([[x, -y], [x, -y / 2], [x, 0.0], [x, y / 2], [-x, 0.0], [x + 5.0, 0.0]])
+        assert pitch.height(along_the_goal_line) == pytest.approx([0.0, 0.15, 0.3, 0.15, 0.3, 0.3])
+    hipped = raised.between_hips()
+    assert hipped.ridge[:, 0] == pytest.approx([-18.5, 18.5])
+    assert hipped.height(np.array([[52.5, 0.0], [35.5, 0.0], [0.0, 17.0]])) == pytest.approx([0.0, 0.15, 0.15])
 
 
 def test_markings_have_the_colour_of_their_paint():
