@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from fields.template import TURF_M
 from worker.calibration.calibrate import calibrate
 from worker.calibration.detection.contrast import Channels
 from worker.calibration.detection.exclusions import of_use
@@ -33,9 +34,6 @@ OF_ONE_KIND = 0.03
 """By which part the focal lengths of cameras of one kind differ, one standard deviation."""
 LENS_OFF = 0.05
 """By which part a focal length that was given may be off, one standard deviation, once lines contradict it."""
-FITS_BETTER = 0.9
-"""Of the residual that the gate allows, through a lens that was found with the pose: it bends to meet a field whose
-measures are wrong by decimetres, and what is left over is smaller for that."""
 IN_ITS_PLACE = "the lens that the lines have is taken in its place"
 Seen = tuple[Channels, NDArray[np.float32]]
 """Channels of a camera's frames, and the fused response (H, W) of the network in 0..1."""
@@ -139,22 +137,25 @@ def find_cameras(
     remembered = _Remembered(segment, {id(frames[one][n]): r for one in placed for n, r in enumerate(responses[one])})
     beside = [camera for camera in known if camera.id in frames]
     options = Options(seed=seed, recover="never")
+    given, as_given, unfit = pitch, placed, dict[str, str]()
     with progress.timed("calibration"):
-        unfit = _with_loose_lenses(by_id.values(), placed)
         while True:
             for camera, words in unfit.items():
                 one = replace(by_id[camera], lenses=[SoughtLens.around(by_id[camera].lenses[0].lens, LENS_OFF)])
-                placed[camera] = _through_lens_of_lines(pitch, markings, one, placed[camera], seen[camera], words)
+                as_given[camera] = _through_lens_of_lines(given, markings, one, as_given[camera], seen[camera], words)
                 by_id[camera] = one
-            if pitch.ridge is None and not known:
-                pitch, placed = _on_its_crown(pitch, placed, by_id, seen)
+            if given.ridge is None and not known:
+                pitch, placed = _on_its_crown(given, as_given, by_id, seen)
+            unfit = _with_loose_lenses(by_id.values(), placed)
+            if unfit:
+                continue
             progress.at_fraction("refinement", SEARCHED)
             found = [one.candidates[0].camera for one in placed.values() if one.refusal is None]
             calibrated = calibrate(pitch, [*found, *beside], frames, remembered, options, stop=stop) if found else None
             unfit = {} if calibrated is None else _with_unfit_lenses(by_id.values(), calibrated)
             if not unfit:
                 break
-    judged = [_judged(camera, placed[camera.id], calibrated) for camera in by_id.values()]
+    judged = [_judged(camera, placed[camera], calibrated) for camera in by_id]
     is_side_assumed = markings.is_symmetric and not known and all(by_id[one.id].place.is_anywhere for one in found)
     return FoundCameras(
         pitch,
@@ -286,7 +287,8 @@ def _on_its_crown(
 ) -> tuple[Field, dict[str, Relocalisation]]:
     """Return the field with the ridge that fits the lines of the cameras found on it flat, and these cameras on it."""
     found = [camera for camera, one in placed.items() if one.refusal is None]
-    if not found:
+    # Floors, courts and ice are level to millimetres.
+    if not found or flat.template.uneven < TURF_M:
         return flat, placed
     observations = Observations([seen[one][0] for one in found], [seen[one][1] for one in found])
     candidates = [placed[one].candidates[0] for one in found]
@@ -336,16 +338,16 @@ def _through_lens_of_lines(
     return replace(found, candidates=candidates, refusal=refusal, remarks=[*found.remarks, words])
 
 
-def _judged(sought: SoughtCamera, found: Relocalisation, calibrated: Calibration | None) -> FoundCamera:
+def _judged(camera: str, found: Relocalisation, calibrated: Calibration | None) -> FoundCamera:
     """Return the result for one camera, with the verdict of the calibration that began with it."""
     if found.refusal is not None or calibrated is None:
-        return FoundCamera(sought.id, found.candidates, found.refusal, found.remarks)
-    (result,) = (one for one in calibrated.cameras if one.camera.id == sought.id)
-    words = why_not_confirmed(result, is_lens_found=sought.is_lens_sought)
-    if words is not None:
-        return FoundCamera(sought.id, found.candidates, NotFound("not-confirmed", words), found.remarks)
+        return FoundCamera(camera, found.candidates, found.refusal, found.remarks)
+    (result,) = (one for one in calibrated.cameras if one.camera.id == camera)
+    if result.refusal is not None:
+        refusal = NotFound("not-confirmed", result.refusal.words)
+        return FoundCamera(camera, found.candidates, refusal, found.remarks)
     best, *others = found.candidates
-    return FoundCamera(sought.id, [replace(best, camera=result.camera), *others], None, found.remarks)
+    return FoundCamera(camera, [replace(best, camera=result.camera), *others], None, found.remarks)
 
 
 def _with_twin(found: FoundCamera) -> FoundCamera:
@@ -353,20 +355,6 @@ def _with_twin(found: FoundCamera) -> FoundCamera:
     best, *others = found.candidates
     both = [best, replace(best, camera=twin(best.camera))]
     return replace(found, candidates=[*both, *others], assumed_side=side_of(best.camera))
-
-
-def why_not_confirmed(result: CameraResult, *, is_lens_found: bool) -> str | None:
-    """Return in words why the calibration that began with a camera does not confirm it; None if it does."""
-    if result.refusal is not None:
-        return result.refusal.words
-    most_px = FITS_BETTER * GATE.most_residual_px(result.camera)
-    if is_lens_found and result.residual_px is not None and result.residual_px > most_px:
-        return (
-            f"lines are {result.residual_px:.2f} px from where pose and lens put them, at most {most_px:.2f} allowed "
-            "through a lens that was found with the pose; are the measures of the field right? Say what the "
-            "lens is, if it is known"
-        )
-    return None
 
 
 def why_lens_unfit(result: CameraResult, suspicions: Sequence[Suspicion]) -> str | None:

@@ -108,10 +108,14 @@ def fit_measures(
     pitch: Field, cameras: Sequence[Camera], observations: Observations, stitch_weight: float
 ) -> tuple[RefinedPoses, list[Measure]]:
     """Refine on the field with those measures that the lines tell; return the poses and every measure."""
-    free = free_field(pitch)
-    # A field whose measures are guesses has its lines farther from where they are expected.
-    everything = refine(pitch, cameras, observations, stitch_weight, free, (40.0, 24.0, *SEARCH_PX))
-    tried = try_ridges(everything, free, observations)
+    roofs = pitch.roofs()
+    for pitch in roofs:
+        free = free_field(pitch)
+        # A field whose measures are guesses has its lines farther from where they are expected.
+        everything = refine(pitch, cameras, observations, stitch_weight, free, (40.0, 24.0, *SEARCH_PX))
+        tried = try_ridges(everything, free, observations)
+        if tried.cost(pitch.ridge_length) == min(tried.cost(roof.ridge_length) for roof in roofs):
+            break
     measures = [
         _measure(pitch, everything.pitch, parameter, found, tried, cameras)
         for parameter, found in zip(free, everything.parameter_uncertainties, strict=True)

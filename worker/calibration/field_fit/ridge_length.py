@@ -70,6 +70,10 @@ class TriedRidges:
         lengths = self.lengths[self._costs < self._costs.min() + 4.0]
         return float(lengths.min()), float(lengths.max())
 
+    def cost(self, length: float) -> float:
+        """Return the cost of the tried ridge whose length is nearest to this one."""
+        return float(self._costs[np.argmin(np.abs(self.lengths - length))])
+
     def spread(self, read: Callable[[Field], float]) -> float:
         """Return the rms error of another measure because the ridge is not as long as it was held."""
         off = np.array([read(ridge.pitch) for ridge in self.tried]) - read(self.held)

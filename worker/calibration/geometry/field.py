@@ -116,9 +116,14 @@ class Field:
         end = self.length / 2
         return replace(self, ridge=np.array([[-end, 0.0, by], [end, 0.0, by]]))
 
-    def between_hips(self) -> "Field":
-        """Return the field with the ends of its ridge where hips of 45° have them, each as wide as half the field."""
-        return self.with_ridge_length(max(self.length - self.width, 0.0))
+    def roofs(self) -> list["Field"]:
+        """Return the field on the roofs that it may lie on: its own, or if it is flat, gables and hips of 45° in plan.
+
+        The ridge of a gabled field ends at its goal lines, as in stadiums. Both have no height yet.
+        """
+        if self.ridge is not None:
+            return [self]
+        return [self.raised(0.0), self.with_ridge_length(max(self.length - self.width, 0.0))]
 
     @property
     def ridge_height(self) -> float:

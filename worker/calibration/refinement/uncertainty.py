@@ -6,6 +6,7 @@ every lens and of the field unknown: the poses that are then best are nearer the
 poses that are answered belongs to their error.
 """
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
@@ -219,6 +220,16 @@ class RefinedPoses:
     def cameras(self) -> list[Camera]:
         """Cameras at their refined poses."""
         return [one.camera for one in self.each]
+
+    @property
+    def residual_px(self) -> float:
+        """Rms distance of the lines from all cameras, px; infinite if one was not measured."""
+        return rms_of_all([one.residual_px for one in self.each])
+
+
+def rms_of_all(residuals_px: Sequence[float | None]) -> float:
+    """Return the rms of several cameras' residuals, px; infinite if one was not measured."""
+    return math.hypot(*(math.inf if one is None else one for one in residuals_px)) / math.sqrt(len(residuals_px))
 
 
 def estimate_uncertainty(

@@ -15,7 +15,7 @@ from worker.calibration.gate.quality import GATE
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.parameters import FREE_RIDGE_M, LensParameter, free_ridge
 from worker.calibration.refinement.refine import CLEARLY_MORE, SEARCH_PX, Observations, refine, refine_coarsely
-from worker.calibration.refinement.uncertainty import RefinedPose
+from worker.calibration.refinement.uncertainty import rms_of_all
 from worker.calibration.relocalisation.candidate import Candidate, FrameObservations, free_lens_if_sought
 from worker.calibration.relocalisation.sought import SoughtCamera
 
@@ -39,13 +39,9 @@ def find_crown(
     cameras, lenses = [one.camera for one in candidates], _free_lenses(sought, candidates)
     # A lens that has bent to the flat holds a free ridge down. So it bends to a low and a high crown first, whose lines
     # lie farther from where the flat has them than an ordinary refinement looks.
-    roofs = [
-        roof.raised(height_m)
-        for roof in (flat.raised(0.0), flat.between_hips())
-        for height_m in (FREE_RIDGE_M / 2, FREE_RIDGE_M)
-    ]
+    roofs = [roof.raised(height_m) for roof in flat.roofs() for height_m in (FREE_RIDGE_M / 2, FREE_RIDGE_M)]
     bent = [refine_coarsely(roof, cameras, observations, lenses, (28.0, *SEARCH_PX)) for roof in roofs]
-    begun = min(bent, key=lambda one: np.nan_to_num(_rms(one.each), nan=np.inf))
+    begun = min(bent, key=lambda one: one.residual_px)
     found = refine(begun.pitch, begun.cameras, observations, 0.0, [*lenses, *free_ridge(begun.pitch)])
     height_m, sigma_m = found.pitch.ridge_height, found.parameter_uncertainties[-1].sigma
     # It is at least 5 cm high, and five of its standard deviations.
@@ -55,7 +51,8 @@ def find_crown(
     refined = [frame.assessed(pose, one) for frame, pose, one in zip(observed, found.each, sought, strict=True)]
     lost = np.mean([before.agreement - now.agreement for before, now in zip(candidates, refined, strict=True)])
     # Largest ratio of the lines' rms distance from the cameras with a ridge to that on a flat field.
-    if not _rms(refined) < 0.85 * _rms(candidates) or lost > CLEARLY_MORE:
+    most_px = 0.85 * rms_of_all([one.residual_px for one in candidates])
+    if found.residual_px >= most_px or lost > CLEARLY_MORE:
         return None
     return CrownedField(found.pitch, refined)
 
@@ -67,8 +64,3 @@ def _free_lenses(sought: Sequence[SoughtCamera], candidates: Sequence[Candidate]
         for number, (one, candidate) in enumerate(zip(sought, candidates, strict=True))
         for parameter in free_lens_if_sought(number, candidate.camera, one)
     ]
-
-
-def _rms(candidates: Sequence[Candidate] | Sequence[RefinedPose]) -> float:
-    """Return the rms distance of the lines from the cameras, px; NaN where one was not measured."""
-    return float(np.sqrt(np.mean([np.nan if one.residual_px is None else one.residual_px**2 for one in candidates])))

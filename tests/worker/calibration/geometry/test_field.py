@@ -120,7 +120,7 @@ def test_the_goal_lines_of_a_flat_field_that_is_raised_go_over_its_crown_and_sta
         x, y = pitch.length / 2, pitch.width / 2
         along_the_goal_line = np.array([[x, -y], [x, -y / 2], [x, 0.0], [x, y / 2], [-x, 0.0], [x + 5.0, 0.0]])
         assert pitch.height(along_the_goal_line) == pytest.approx([0.0, 0.15, 0.3, 0.15, 0.3, 0.3])
-    hipped = raised.between_hips()
+    hipped = PITCH.roofs()[1].raised(0.3)
     assert hipped.ridge[:, 0] == pytest.approx([-18.5, 18.5])
     assert hipped.height(np.array([[52.5, 0.0], [35.5, 0.0], [0.0, 17.0]])) == pytest.approx([0.0, 0.15, 0.15])
 
