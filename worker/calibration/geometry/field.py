@@ -112,9 +112,13 @@ class Field:
     def raised(self, by: float) -> "Field":
         """Return the field with its ridge raised by so many metres; a flat one gets one from goal line to goal line."""
         if self.ridge is not None:
-            return replace(self, ridge=self.ridge + [0.0, 0.0, by])
+            return self._with_ridge(self.ridge + [0.0, 0.0, by])
         end = self.length / 2
-        return replace(self, ridge=np.array([[-end, 0.0, by], [end, 0.0, by]]))
+        return self._with_ridge(np.array([[-end, 0.0, by], [end, 0.0, by]]))
+
+    def _with_ridge(self, ridge: Array) -> "Field":
+        # The same markings, drawn once for all heights that are tried.
+        return replace(self, ridge=ridge, stretched_from=self._unstretched)
 
     def roofs(self) -> list["Field"]:
         """Return the field on the roofs that it may lie on: its own, or if it is flat, gables and hips of 45° in plan.
@@ -144,7 +148,7 @@ class Field:
         (start, end) = raised.ridge[np.argsort(raised.ridge[:, 0])]
         middle = (start[0] + end[0]) / 2
         half = min(max(length / 2, 0.0), self.length / 2 - abs(middle))
-        return replace(raised, ridge=np.array([[middle - half, *start[1:]], [middle + half, *end[1:]]]))
+        return self._with_ridge(np.array([[middle - half, *start[1:]], [middle + half, *end[1:]]]))
 
     @property
     def gables(self) -> tuple[bool, bool]:
@@ -184,6 +188,8 @@ class Field:
 
     @cached_property
     def _markings(self) -> list[Marking]:
+        if self._unstretched is not self and self._unstretched._size == self._size:
+            return self._unstretched._markings
         return [_marking(shape) for shape in self.template.markings(self._size, self._unstretched._size)]
 
     @property

@@ -37,9 +37,9 @@ def find_crown(
     A lens that was given stays.
     """
     cameras, lenses = [one.camera for one in candidates], _free_lenses(sought, candidates)
-    # A lens that has bent to the flat holds a free ridge down. So it bends to a low and a high crown first, whose lines
-    # lie farther from where the flat has them than an ordinary refinement looks.
-    roofs = [roof.raised(height_m) for roof in flat.roofs() for height_m in (FREE_RIDGE_M / 2, FREE_RIDGE_M)]
+    # A lens that has bent to the flat holds a free ridge down. So it bends to a high crown first, whose lines lie
+    # farther from where the flat has them than an ordinary refinement looks.
+    roofs = [roof.raised(FREE_RIDGE_M) for roof in flat.roofs()]
     bent = [refine_coarsely(roof, cameras, observations, lenses, (28.0, *SEARCH_PX)) for roof in roofs]
     begun = min(bent, key=lambda one: one.residual_px)
     found = refine(begun.pitch, begun.cameras, observations, 0.0, [*lenses, *free_ridge(begun.pitch)])
