@@ -47,7 +47,7 @@ def main() -> None:
     # Pydantic would look for plugins among all installed packages, a quarter of the time of a short command.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     try:
-        app()
+        app(prog_name="esc")
     except BrokenPipeError:
         # Nobody reads any more, as after `| head -2`.
         pass
