@@ -263,7 +263,10 @@ class FieldOfPlay(Schema):
             raise ValueError("both ends of the ridge need the same y and the same z")
         # Answers are rounded to a millimetre.
         if max(abs(x1), abs(x2)) > self.length_m / 2 + 0.001 or abs(y1) >= self.width_m / 2:
-            raise ValueError("the ridge must lie inside the pitch")
+            raise ValueError(
+                f"the ridge must lie inside the pitch, within {self.length_m / 2:g} m along and {self.width_m / 2:g} m "
+                f"across from its middle, not at {x1:g} and {x2:g} m along, {y1:g} m across"
+            )
         if not 0 <= z1 <= 3:
             raise ValueError(f"the ridge must be 0 to 3 m high, not {z1:g} m")
         return self

@@ -221,3 +221,18 @@ def test_other_markings_that_cannot_be_are_refused(wrong, told):
 def test_a_ground_is_shared_by_so_many_sports_at_most():
     with pytest.raises(ValidationError, match="17 fields of other sports: at most 16"):
         FieldOfPlay.model_validate({"other_markings": [{"template": "padel"}] * 17})
+
+
+def test_a_ridge_may_end_at_the_goal_lines_to_a_millimetre_and_no_farther_out():
+    assert FieldOfPlay(length_m=99.617, width_m=67.8, ridge=[[-49.809, 0, 0.2], [49.809, 0, 0.2]]).ridge
+    with pytest.raises(ValidationError, match="from its middle, not at -50 and 49 m along, 0 m"):
+        FieldOfPlay(length_m=99.617, width_m=67.8, ridge=[[-50, 0, 0.2], [49, 0, 0.2]])
+
+
+def test_the_ridge_of_a_field_is_stretched_with_a_length_and_a_width_that_are_adopted():
+    crowned = FieldOfPlay(length_m=105, width_m=68, ridge=[[-52.5, 3.4, 0.2], [52.5, 3.4, 0.2]])
+    assert crowned.with_number("length_m", 104).ridge == [[-52, 3.4, 0.2], [52, 3.4, 0.2]]
+    assert crowned.with_number("width_m", 66).ridge == [
+        [-52.5, pytest.approx(3.3), 0.2],
+        [52.5, pytest.approx(3.3), 0.2],
+    ]

@@ -152,11 +152,12 @@ class Field:
 
     @property
     def gables(self) -> tuple[bool, bool]:
-        """For the left and the right goal line: True if the ridge ends at it, to the width of its paint."""
+        """For the left and the right goal line: True if the ridge ends at it, so that it goes over the crown."""
         if self.ridge is None:
             return False, False
         left, right = self.length / 2 + self.ridge[:, 0].min(), self.length / 2 - self.ridge[:, 0].max()
-        return bool(left < self.line_width), bool(right < self.line_width)
+        # No ground falls by a crown within a metre; but a length may have been measured again since the ridge was.
+        return bool(left < 1.0), bool(right < 1.0)
 
     def height(self, xy: Array) -> Array:
         """Return the height (...) of the surface at (..., 2): the paper's hip roof, 0 off the field.
