@@ -12,10 +12,11 @@ from functools import partial
 import numpy as np
 
 from worker.calibration.gate.quality import GATE
+from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.parameters import FREE_RIDGE_M, LensParameter, free_ridge
 from worker.calibration.refinement.refine import CLEARLY_MORE, SEARCH_PX, Observations, refine, refine_coarsely
-from worker.calibration.refinement.uncertainty import rms_of_all
+from worker.calibration.refinement.uncertainty import RefinedPoses, rms_of_all
 from worker.calibration.relocalisation.candidate import Candidate, FrameObservations, free_lens_if_sought
 from worker.calibration.relocalisation.sought import SoughtCamera
 
@@ -36,25 +37,37 @@ def find_crown(
     `candidates`: the result on the `flat` field for each camera that was `sought`; `observations`: of the same cameras.
     A lens that was given stays.
     """
-    cameras, lenses = [one.camera for one in candidates], _free_lenses(sought, candidates)
+    lenses = _free_lenses(sought, candidates)
+    flat_px = rms_of_all([one.residual_px for one in candidates])
+    caught = _catch_lines(flat, [one.camera for one in candidates], lenses, observations)
+    if not _is_crown(caught, flat_px):
+        return None
+    found = refine(caught.pitch, caught.cameras, observations, 0.0, [*lenses, *free_ridge(caught.pitch)])
+    observed = map(partial(FrameObservations.of, found.pitch), observations.channels, observations.responses)
+    refined = [frame.assessed(pose, one) for frame, pose, one in zip(observed, found.each, sought, strict=True)]
+    lost = np.mean([before.agreement - now.agreement for before, now in zip(candidates, refined, strict=True)])
+    if not _is_crown(found, flat_px) or lost > CLEARLY_MORE:
+        return None
+    return CrownedField(found.pitch, refined)
+
+
+def _catch_lines(
+    flat: Field, cameras: Sequence[Camera], lenses: Sequence[LensParameter], observations: Observations
+) -> RefinedPoses:
+    """Refine cameras, lenses and a ridge coarsely, on the roof that the lines lie closer to."""
     # A lens that has bent to the flat holds a free ridge down. So it bends to a high crown first, whose lines lie
     # farther from where the flat has them than an ordinary refinement looks.
     roofs = [roof.raised(FREE_RIDGE_M) for roof in flat.roofs()]
     bent = [refine_coarsely(roof, cameras, observations, lenses, (28.0, *SEARCH_PX)) for roof in roofs]
     begun = min(bent, key=lambda one: one.residual_px)
-    found = refine(begun.pitch, begun.cameras, observations, 0.0, [*lenses, *free_ridge(begun.pitch)])
+    return refine_coarsely(begun.pitch, begun.cameras, observations, [*lenses, *free_ridge(begun.pitch)])
+
+
+def _is_crown(found: RefinedPoses, flat_px: float) -> bool:
+    """True if the lines show the ridge that was `found`, the last free parameter; `flat_px`: their rms on the flat."""
     height_m, sigma_m = found.pitch.ridge_height, found.parameter_uncertainties[-1].sigma
-    # It is at least 5 cm high, and five of its standard deviations.
-    if not max(0.05, 5.0 * sigma_m) < height_m < GATE.highest_ridge_m:
-        return None
-    observed = map(partial(FrameObservations.of, found.pitch), observations.channels, observations.responses)
-    refined = [frame.assessed(pose, one) for frame, pose, one in zip(observed, found.each, sought, strict=True)]
-    lost = np.mean([before.agreement - now.agreement for before, now in zip(candidates, refined, strict=True)])
-    # Largest ratio of the lines' rms distance from the cameras with a ridge to that on a flat field.
-    most_px = 0.85 * rms_of_all([one.residual_px for one in candidates])
-    if found.residual_px >= most_px or lost > CLEARLY_MORE:
-        return None
-    return CrownedField(found.pitch, refined)
+    # It is at least 5 cm high, and five of its standard deviations; and the lines are closer by such a part.
+    return max(0.05, 5.0 * sigma_m) < height_m < GATE.highest_ridge_m and found.residual_px < 0.85 * flat_px
 
 
 def _free_lenses(sought: Sequence[SoughtCamera], candidates: Sequence[Candidate]) -> list[LensParameter]:
