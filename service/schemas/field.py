@@ -289,11 +289,11 @@ class FieldOfPlay(Schema):
         return FieldOfPlay.model_validate(self.model_dump() | values)
 
     def _ridge_at(self, height_m: float) -> list[Row]:
-        """Return the ridge at another height; a flat field gets one from goal line to goal line, as calibrations do."""
+        """Return the ridge at another height; a flat field gets one between hips of 45°, as calibrations assume."""
         if self.ridge is not None:
             return [[x, y, height_m] for x, y, _ in self.ridge]
-        end = self.length_m / 2
-        return [[-end, 0.0, height_m], [end, 0.0, height_m]]
+        end = max((self.length_m - self.width_m) / 2, 0.0)
+        return [[0.0 - end, 0.0, height_m], [end, 0.0, height_m]]
 
     def _stretched_ridge(self, name: FieldNumber, times: float) -> list[Row] | None:
         """Return the ridge of the field with another length or width, stretched with it as calibrations do."""

@@ -20,7 +20,7 @@ def pitch_of(name: str, ridge: float | None = None) -> Field:
     template = load(name)
     length, width, line = (template.size[measure].default for measure in ("length", "width", "line"))
     flat = Field(length, width, line, None, template)
-    return flat if ridge is None else flat.raised(ridge)
+    return flat if ridge is None else flat.roofs()[0].raised(ridge)
 
 
 def above(pitch: Field) -> Camera:

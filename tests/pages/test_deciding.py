@@ -131,7 +131,7 @@ def test_a_ridge_that_the_lines_have_is_stored_after_a_question_that_says_what_c
     expect(contradicted).to_contain_text("It cannot be stored: football: 60 to 130 m, not 131.5.")
     asked = press_and_confirm(contradicted.get_by_role("button", name="Store a ridge 0.332 m high"))
     expect(contradicted.get_by_role("button")).to_have_count(0)
-    assert stub.http.get(f"/venues/{name}").json()["field"]["ridge"][0] == [-52.5, 0.0, 0.332]
+    assert stub.http.get(f"/venues/{name}").json()["field"]["ridge"][0] == [-18.5, 0.0, 0.332]
     assert asked == (
         "Store a ridge 0.332 m high instead of 0.000 m? The lines are sure of it to ± 5.10 cm. The next calibration "
         "will move left by about 8.10 cm and right by about 7.90 cm. What the cameras remember of "

@@ -15,7 +15,8 @@ function fieldAsTyped() {
   for (const name of ["length_m", "width_m", "line_width_m"]) if (value(name) !== undefined) field[name] = value(name);
   const height = value("ridge_height");
   if (height) {
-    const half = (value("ridge_length") ?? field.length_m ?? pitch.plan?.field.length_m ?? 105) / 2;
+    const usual = pitch.plan ? pitch.plan.field.length_m - pitch.plan.field.width_m : 37;
+    const half = (value("ridge_length") ?? usual) / 2;
     field.ridge = [[-half, 0, height], [half, 0, height]];
   }
   return field;

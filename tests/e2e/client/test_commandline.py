@@ -548,7 +548,7 @@ def test_refined_poses_are_exported_and_stored_by_name(service, esc, name):
 def test_a_number_of_the_field_that_a_job_offers_is_stored_by_name(service, esc, name):
     job = service.calibrated(service.venue(name, "contradict"))["id"]
     stored = json.loads(esc("venue", "adopt", name, "--field", "ridge_height_m", "--job", job).stdout)
-    assert stored["field"]["ridge"] == [[-52.5, 0.0, 0.332], [52.5, 0.0, 0.332]]
+    assert stored["field"]["ridge"] == [[-18.5, 0.0, 0.332], [18.5, 0.0, 0.332]]
     history = esc("venue", "history", name, "--limit", "1").stdout.split()
     assert history[2:4] == ["adopted", job]
     beyond = esc("venue", "adopt", name, "--field", "length_m", "--job", job)

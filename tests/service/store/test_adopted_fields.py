@@ -14,7 +14,7 @@ from worker.calibration.geometry.field import Field
 from worker.jobs.from_schemas import pitch_of
 
 RIDGE, LENGTH = ("ridge_height_m", 0.0, 0.332), ("length_m", 105.0, 104.6)
-ROOFED = [[-52.5, 0.0, 0.332], [52.5, 0.0, 0.332]]
+HIPPED = [[-18.5, 0.0, 0.332], [18.5, 0.0, 0.332]]
 
 
 def night(stock, *numbers, accepted=True, **options):
@@ -52,11 +52,11 @@ def test_a_ridge_is_stored_as_a_revision_of_its_own_and_moves_no_camera(stock):
     job = night(stock, RIDGE)
     before = stock.venues.get("v")
     field = adopted(stock, job)
-    assert field == before.field.model_copy(update={"ridge": ROOFED})
+    assert field == before.field.model_copy(update={"ridge": HIPPED})
     after = stock.venues.get("v")
     assert (after.field, after.cameras) == (field, before.cameras)
     revision = newest(stock)
-    assert (revision.revision, revision.cause, revision.job, revision.ridge) == (3, "adopted", job, ROOFED)
+    assert (revision.revision, revision.cause, revision.job, revision.ridge) == (3, "adopted", job, HIPPED)
     assert {name: (one.before, one.after) for name, one in revision.field_numbers.items()} == {
         "ridge_height_m": (0.0, 0.332)
     }
@@ -93,8 +93,8 @@ def test_a_ridge_and_a_length_of_one_job_are_stored_one_after_the_other_in_any_o
     assert adopted(stock, job, "length_m").length_m == 104.6
     assert offered(stock, job) == ["ridge_height_m"]
     both = adopted(stock, job)
-    # The ridge of a pitch of 105 m is stretched with it.
-    assert (both.length_m, both.ridge) == (104.6, [[-52.3, 0.0, 0.332], [52.3, 0.0, 0.332]])
+    # The ridge is the one that the lines were asked for, of a pitch of 105 m, stretched with that.
+    assert (both.length_m, both.ridge[1]) == (104.6, pytest.approx([18.5 * 104.6 / 105.0, 0.0, 0.332]))
     assert offered(stock, job) == []
     assert adopted(stock, job) == both
 
@@ -152,7 +152,7 @@ def test_poses_that_a_person_accepted_or_restored_hold_too_and_so_do_refined_one
     assert offered(stock, by_hand) == ["ridge_height_m"]
     last = night(stock, RIDGE)
     stock.adoption.adopt_refined("v", "left")
-    assert adopted(stock, last).ridge == ROOFED
+    assert adopted(stock, last).ridge == HIPPED
 
 
 def test_on_a_field_that_was_put_since_nothing_is_offered(stock):

@@ -110,10 +110,10 @@ class Field:
         return replace(self, ridge=None)
 
     def raised(self, by: float) -> "Field":
-        """Return the field with its ridge raised by so many metres; a flat one gets one from goal line to goal line."""
+        """Return the field with its ridge raised by so many metres; a flat one gets a ridge between hips of 45°."""
         if self.ridge is not None:
             return self._with_ridge(self.ridge + [0.0, 0.0, by])
-        end = self.length / 2
+        end = max((self.length - self.width) / 2, 0.0)
         return self._with_ridge(np.array([[-end, 0.0, by], [end, 0.0, by]]))
 
     def _with_ridge(self, ridge: Array) -> "Field":
@@ -121,13 +121,11 @@ class Field:
         return replace(self, ridge=ridge, stretched_from=self._unstretched)
 
     def roofs(self) -> list["Field"]:
-        """Return the field on the roofs that it may lie on: its own, or if it is flat, gables and hips of 45° in plan.
+        """Return the field on the roofs that it may lie on: its own, or if it is flat, gables and hips of 45°.
 
         The ridge of a gabled field ends at its goal lines, as in stadiums. Both have no height yet.
         """
-        if self.ridge is not None:
-            return [self]
-        return [self.raised(0.0), self.with_ridge_length(max(self.length - self.width, 0.0))]
+        return [self] if self.ridge is not None else [self.with_ridge_length(self.length), self.raised(0.0)]
 
     @property
     def ridge_height(self) -> float:

@@ -114,13 +114,14 @@ def test_a_ridge_gets_another_length_around_its_middle_as_far_as_there_is_room()
     assert PITCH.with_ridge_length(8.0).height(np.array([3.0, 5.0])) == 0.0
 
 
-def test_the_goal_lines_of_a_flat_field_that_is_raised_go_over_its_crown_and_stay_on_it_at_another_length():
-    raised = PITCH.raised(0.3)
+def test_goal_lines_at_which_the_ridge_ends_go_over_the_crown_and_stay_on_it_at_another_length():
+    gables, hips = PITCH.roofs()
+    raised = gables.raised(0.3)
     for pitch in (raised, raised.resized(length=98.4, width=70.0), replace(raised, ridge=raised.ridge.round(1))):
         x, y = pitch.length / 2, pitch.width / 2
         along_the_goal_line = np.array([[x, -y], [x, -y / 2], [x, 0.0], [x, y / 2], [-x, 0.0], [x + 5.0, 0.0]])
         assert pitch.height(along_the_goal_line) == pytest.approx([0.0, 0.15, 0.3, 0.15, 0.3, 0.3])
-    hipped = PITCH.roofs()[1].raised(0.3)
+    hipped = hips.raised(0.3)
     assert hipped.ridge[:, 0] == pytest.approx([-18.5, 18.5])
     assert hipped.height(np.array([[52.5, 0.0], [35.5, 0.0], [0.0, 17.0]])) == pytest.approx([0.0, 0.15, 0.15])
 
