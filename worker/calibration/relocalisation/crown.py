@@ -38,15 +38,16 @@ def find_crown(
     A lens that was given stays.
     """
     lenses = _free_lenses(sought, candidates)
-    flat_px = rms_of_all([one.residual_px for one in candidates])
     caught = _catch_lines(flat, [one.camera for one in candidates], lenses, observations)
-    if not _is_crown(caught, flat_px):
+    if not _is_high_enough(caught):
         return None
     found = refine(caught.pitch, caught.cameras, observations, 0.0, [*lenses, *free_ridge(caught.pitch)])
     observed = map(partial(FrameObservations.of, found.pitch), observations.channels, observations.responses)
     refined = [frame.assessed(pose, one) for frame, pose, one in zip(observed, found.each, sought, strict=True)]
     lost = np.mean([before.agreement - now.agreement for before, now in zip(candidates, refined, strict=True)])
-    if not _is_crown(found, flat_px) or lost > CLEARLY_MORE:
+    # Largest ratio of the lines' rms distance from the cameras with a ridge to that on a flat field.
+    most_px = 0.85 * rms_of_all([one.residual_px for one in candidates])
+    if not _is_high_enough(found) or found.residual_px >= most_px or lost > CLEARLY_MORE:
         return None
     return CrownedField(found.pitch, refined)
 
@@ -63,11 +64,11 @@ def _catch_lines(
     return refine_coarsely(begun.pitch, begun.cameras, observations, [*lenses, *free_ridge(begun.pitch)])
 
 
-def _is_crown(found: RefinedPoses, flat_px: float) -> bool:
-    """True if the lines show the ridge that was `found`, the last free parameter; `flat_px`: their rms on the flat."""
+def _is_high_enough(found: RefinedPoses) -> bool:
+    """True if the ridge that was found, the last free parameter, is surely one, and one that a field has."""
     height_m, sigma_m = found.pitch.ridge_height, found.parameter_uncertainties[-1].sigma
-    # It is at least 5 cm high, and five of its standard deviations; and the lines are closer by such a part.
-    return max(0.05, 5.0 * sigma_m) < height_m < GATE.highest_ridge_m and found.residual_px < 0.85 * flat_px
+    # It is at least 5 cm high, and five of its standard deviations.
+    return max(0.05, 5.0 * sigma_m) < height_m < GATE.highest_ridge_m
 
 
 def _free_lenses(sought: Sequence[SoughtCamera], candidates: Sequence[Candidate]) -> list[LensParameter]:
