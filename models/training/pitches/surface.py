@@ -120,19 +120,8 @@ def ground_patch(pitch: Field, world: World | None, centre: Plane, rays: Plane) 
 
 def _roof_planes(pitch: Field) -> list[tuple[float, float, float]]:
     """z = a x + b y + c of the planes of the roof (`Field.height`)."""
-    assert pitch.ridge is not None
-    start, end = pitch.ridge[np.argsort(pitch.ridge[:, 0])]
-    top, ridge_y, half_length, half_width = start[2], start[1], pitch.length / 2, pitch.width / 2
-    south, north = top / (half_width + ridge_y), top / (half_width - ridge_y)
-    planes = [(0.0, south, south * half_width), (0.0, -north, north * half_width)]
-    left_gable, right_gable = pitch.gables
-    if not left_gable:
-        west = top / (half_length + start[0])
-        planes.append((west, 0.0, west * half_length))
-    if not right_gable:
-        east = top / (half_length - end[0])
-        planes.append((-east, 0.0, east * half_length))
-    return planes
+    planes = [(u, v, a, pitch.ridge_height / b) for u, v, a, b in pitch.roof_planes]
+    return [(u * slope, v * slope, slope * a) for u, v, a, slope in planes]
 
 
 def marking_shares(pitch: Field, patch: Patch, rough: Plane | float = 0.0) -> tuple[Plane, Plane]:

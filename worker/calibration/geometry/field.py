@@ -149,33 +149,29 @@ class Field:
         return self._with_ridge(np.array([[middle - half, *start[1:]], [middle + half, *end[1:]]]))
 
     @property
-    def gables(self) -> tuple[bool, bool]:
-        """For the left and the right goal line: True if the ridge ends at it, so that it goes over the crown."""
-        if self.ridge is None:
-            return False, False
-        left, right = self.length / 2 + self.ridge[:, 0].min(), self.length / 2 - self.ridge[:, 0].max()
+    def roof_planes(self) -> list[tuple[float, float, float, float]]:
+        """Planes (u, v, a, b) of the roof: at (x, y) each is (u x + v y + a) / b of the ridge's height up.
+
+        A goal line at which the ridge ends has none: it goes over the crown.
+        """
+        assert self.ridge is not None
+        start, end = self.ridge[np.argsort(self.ridge[:, 0])]
+        half_length, half_width = self.length / 2, self.width / 2
+        sides = [(0.0, 1.0, half_width, half_width + start[1]), (0.0, -1.0, half_width, half_width - start[1])]
+        hips = [(1.0, 0.0, half_length, half_length + start[0]), (-1.0, 0.0, half_length, half_length - end[0])]
         # No ground falls by a crown within a metre; but a length may have been measured again since the ridge was.
-        return bool(left < 1.0), bool(right < 1.0)
+        return [*sides, *(hip for hip in hips if hip[3] >= 1.0)]
 
     def height(self, xy: Array) -> Array:
         """Return the height (...) of the surface at (..., 2): the paper's hip roof, 0 off the field.
 
-        Without the plane at a goal line at which the ridge ends; the ground goes on behind that.
+        Behind a goal line at which the ridge ends the ground goes on.
         """
         if self.ridge is None:
             return np.zeros(xy.shape[:-1])
-        start, end = self.ridge[np.argsort(self.ridge[:, 0])]
-        top, ridge_y = start[2], start[1]
-        half_length, half_width = self.length / 2, self.width / 2
         x, y = xy[..., 0], xy[..., 1]
-        # Each plane goes through two corners at z = 0 and the ridge (or one of its ends): relative height 0..1.
-        planes = [(half_width + y) / (half_width + ridge_y), (half_width - y) / (half_width - ridge_y)]
-        left_gable, right_gable = self.gables
-        if not left_gable:
-            planes.append((half_length + x) / (half_length + start[0]))
-        if not right_gable:
-            planes.append((half_length - x) / (half_length - end[0]))
-        return top * np.clip(np.min(planes, axis=0), 0.0, 1.0)
+        planes = [(a + (u * x + v * y)) / b for u, v, a, b in self.roof_planes]
+        return self.ridge_height * np.clip(np.min(planes, axis=0), 0.0, 1.0)
 
     def lift(self, xy: Array) -> Array:
         """Return points (..., 2) of the field lifted to its surface (..., 3)."""
