@@ -7,8 +7,11 @@ from worker.calibration.relocalisation.field_map import FieldMap
 from worker.calibration.relocalisation.hypotheses import Hypotheses, rotations_of
 
 LOWEST_M, HIGHEST_M = 2.0, 35.0
+"""Range of the height of a camera, from a tripod to the roof of a stand: the prior is even in its logarithm. No bench
+has chosen it."""
 BESIDE, AIMED_AT = 1.3, 1.1
-"""Range of cameras along a side, and of the places they aim at, in half sizes of the field."""
+"""Range of cameras along a side, and of the places they aim at, in half sizes of the field: even priors, which
+no bench has chosen."""
 
 
 def draw(field: FieldMap, focal_px: Array, roll_sigma: float, count: int, rng: np.random.Generator) -> Hypotheses:
