@@ -12,7 +12,8 @@ that follow from it, and then
   along y and a `count`, rows of rows where there are several. A line of no length is not painted: so may a measure
   leave one out;
 - `[points]` and `[end_points]`: names that people use for points, at nominal places, the outer edges of lines where the
-  law measures to them. A name with `{distance}` stands for all points at that many metres.
+  law measures to them. A name with `{distance}` stands for all points at that many metres;
+- `[numbers]`, see `fields.numbers`.
 
 Places are pairs of what `fields.measures` reads. Those of markings are the middle of the paint.
 """
@@ -28,6 +29,7 @@ from pathlib import Path
 from typing import Any
 
 from fields.measures import value
+from fields.numbers import PaintedNumbers
 from fields.shapes import WHITE, Arc, Line, Point, Shape, Spot, dashes
 
 FILES = Path(__file__).parent
@@ -70,6 +72,7 @@ class Template:
     end: Sequence[Mapping[str, Any]] = ()
     points: Mapping[str, Sequence[str | float]] = field(default_factory=dict)
     end_points: Mapping[str, Sequence[str | float]] = field(default_factory=dict)
+    numbers: PaintedNumbers | None = None
 
     def known(self, size: Mapping[str, float]) -> dict[str, float]:
         """Return every measure by its name: those of `size`, or their defaults, and those that follow from them."""
@@ -90,6 +93,12 @@ class Template:
             for entries in (self.marking, self.end)
         )
         return [*once, *(_at(end, shape) for end in ("left", "right") for shape in left)]
+
+    def number_places(self, size: Mapping[str, float]) -> list[tuple[str, float]]:
+        """Return each number that is painted and the place of its line along the field; those of both ends."""
+        known = self.known(size)
+        left = {} if self.numbers is None else {text: value(x, known) for text, x in self.numbers.text.items()}
+        return [(text, place) for text, x in left.items() for place in sorted({x, -x})]
 
     def whole(self, name: str) -> str:
         """Return the name of the whole marking: the broken line of a dash, the row of a mark, or `name` itself."""
@@ -120,7 +129,9 @@ class Template:
 def load(name: str) -> Template:
     """Return a template by its name, one of `NAMES`."""
     content = tomllib.loads((FILES / f"{name}.toml").read_text())
-    return Template(**content | {"size": {key: Extent(**extent) for key, extent in content["size"].items()}})
+    size = {key: Extent(**extent) for key, extent in content["size"].items()}
+    numbers = PaintedNumbers(**content["numbers"]) if "numbers" in content else None
+    return Template(**content | {"size": size, "numbers": numbers})
 
 
 def _at(end: str, shape: Shape) -> Shape:

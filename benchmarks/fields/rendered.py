@@ -20,6 +20,7 @@ from benchmarks.truth import apart
 from fields.template import load
 from models.training.courts.court import render_court
 from models.training.courts.floors import Floor, clay, concrete, grass, hard_court, ice, random_floor, sand, wood
+from testbed.numbers import with_numbers
 from worker.calibration.geometry.camera import Camera, Frame, Pose, inside
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.ground_view import ground_grid
@@ -56,6 +57,8 @@ GROUNDS: dict[str, Sequence[Floor]] = {
     "volleyball": (wood, hard_court),
 }
 """What each sport is played on."""
+FEET_OF_NUMBERS_M = 10.97
+"""Distance of the numbers on a field of American football from its sidelines: the NFL's 12 yards."""
 
 
 @dataclass(frozen=True)
@@ -163,7 +166,7 @@ def take_shot(name: str, pitch: Field, camera: Camera, rng: np.random.Generator,
     """Render what a camera sees of a template's field, on a ground that is usual for it, or on any."""
     fit = GROUNDS[name]
     floor = fit[rng.integers(len(fit))] if is_usual_floor else random_floor
-    court = render_court(pitch, camera, rng, floor)
+    court = render_court(with_numbers(pitch, FEET_OF_NUMBERS_M), camera, rng, floor)
     return Shot(pitch, camera, court.frame, floor.__name__, _shown(pitch, camera, court.target))
 
 

@@ -25,6 +25,7 @@ from worker.calibration.relocalisation.crown import find_crown
 from worker.calibration.relocalisation.field_halves import choose_sides, side_of
 from worker.calibration.relocalisation.field_map import FieldMap
 from worker.calibration.relocalisation.field_paint import draw_field_paint
+from worker.calibration.relocalisation.painted_numbers import place_by_numbers
 from worker.calibration.relocalisation.relocalise import NotFound, Relocalisation, relocalise, twin, why_not_taken
 from worker.calibration.relocalisation.rivals import tell_rivals_apart
 from worker.calibration.relocalisation.shared_ground import SharedGround
@@ -130,6 +131,7 @@ def find_cameras(
         ground = SharedGround.of(pitch, {camera: its[0] for camera, its in frames.items()})
         placed = _on_their_sides(alone, sought, known, ground) if markings.is_symmetric else alone
         by_id = {one.id: one for one in sought}
+        placed = place_by_numbers(pitch, markings, placed, by_id, seen)
         placed = tell_rivals_apart(pitch, markings, placed, by_id, known, ground)
 
     # Calibrate those that were found, as every later job will, until none has a given lens that its lines contradict:
@@ -333,9 +335,10 @@ def _through_lens_of_lines(
 ) -> Relocalisation:
     """Return a camera that was found with the lens that its lines have, which is `sought` now; `words`: why it is."""
     first, *others = found.candidates
-    candidates = [FrameObservations.of(pitch, *seen).settled(first.camera, sought), *others]
-    refusal = why_not_taken(pitch, markings, sought, candidates)
-    return replace(found, candidates=candidates, refusal=refusal, remarks=[*found.remarks, words])
+    settled = FrameObservations.of(pitch, *seen).settled(first.camera, sought)
+    # It was told apart from the others before, and lies no farther from its lines now.
+    refusal = why_not_taken(pitch, markings, sought, [settled])
+    return replace(found, candidates=[settled, *others], refusal=refusal, remarks=[*found.remarks, words])
 
 
 def _judged(camera: str, found: Relocalisation, calibrated: Calibration | None) -> FoundCamera:

@@ -203,6 +203,10 @@ class Field:
         """Return the name of what each marking is a part of: one name for all dashes of a broken line."""
         return [self.template.whole(marking.name) for marking in self.markings()]
 
+    def number_places(self) -> list[tuple[str, float]]:
+        """Return each number that is painted on the field, and the place (m along it) of the line it stands at."""
+        return self.template.number_places(self._size)
+
     def places(self) -> dict[str, Array]:
         """Return the named points of the template on the surface, (3,) each."""
         return {name: self.lift(np.array(point)) for name, point in self.template.places(self._size).items()}

@@ -13,12 +13,10 @@ from worker.calibration.relocalisation.hypotheses import Hypotheses
 
 def slid_along_field(field: FieldMap, cameras: Hypotheses) -> Hypotheses:
     """Return each camera moved by every distance between two parallel lines, or between two circles of one size."""
-    # Longest slide, as a part of the length or width of the field: longer ones leave too few of the lines in common.
-    largest_share = 0.75
     slides = np.concatenate(
         [
-            _slides(field.lines_along_y, np.array([1.0, 0.0, 0.0]), 2 * largest_share * float(field.half_size[0])),
-            _slides(field.lines_along_x, np.array([0.0, 1.0, 0.0]), 2 * largest_share * float(field.half_size[1])),
+            slides_along(field, 0)[:, None] * np.array([1.0, 0.0, 0.0]),
+            slides_along(field, 1)[:, None] * np.array([0.0, 1.0, 0.0]),
             np.pad(field.between_circles, ((0, 0), (0, 1))),
         ]
     )
@@ -31,10 +29,12 @@ def slid_along_field(field: FieldMap, cameras: Hypotheses) -> Hypotheses:
     )
 
 
-def _slides(places: Array, axis: Array, longest: float) -> Array:
-    """Return the distances between any two of the places (n,) of parallel lines as moves (m, 3) along an axis."""
+def slides_along(field: FieldMap, axis: int) -> Array:
+    """Return the distances (m,), of both signs, between any two parallel lines along the length (0) or width (1)."""
+    places = (field.lines_along_y, field.lines_along_x)[axis]
+    # Longest slide, as a part of the length or width of the field: longer ones leave too few of the lines in common.
+    longest = 0.75 * 2 * float(field.half_size[axis])
     # Difference below which distances between parallel markings are one.
     alike_m = 0.05
     apart = np.unique(np.round((places[:, None] - places).ravel() / alike_m)) * alike_m
-    apart = apart[(np.abs(apart) > alike_m) & (np.abs(apart) <= longest)]
-    return np.asarray(apart[:, None] * axis)
+    return np.asarray(apart[(np.abs(apart) > alike_m) & (np.abs(apart) <= longest)])
