@@ -47,7 +47,8 @@ def place_by_numbers(
         if camera is None or not sought[one].place.allows(camera.pose.position[None])[0]:
             continue
         if camera.pose is not first.camera.pose:
-            first, others = FrameObservations.of(field, channels, response).settled(camera, sought[one]), its.candidates
+            first = FrameObservations.of(field, channels, response).settled(camera, sought[one])
+            others = list(its.candidates)
         as_likely = [other for other in others if reader.most_likely([camera, other.camera]) is not camera]
         refusal = why_not_taken(field, markings, sought[one], [first, *as_likely])
         remark = "the numbers on the field tell which of its lines are seen"
@@ -78,7 +79,7 @@ class _Number:
             cv2.polylines(drawn, [corners], False, 255, round(numbers.stroke / STEP_M * finer))
         # Types differ by about a third of a stroke.
         blurred = cv2.GaussianBlur(drawn, (0, 0), numbers.stroke / 3 / STEP_M * finer)
-        paint = cv2.resize(blurred, (len(right), rows), interpolation=cv2.INTER_AREA) / 255.0
+        paint = cv2.resize(blurred, (len(right), rows), interpolation=cv2.INTER_AREA).astype(float) / 255.0
         beside = np.abs(right) >= beyond
         return cls(place, paint[:, beside], right[beside])
 
