@@ -35,9 +35,10 @@ from benchmarks.scenes import FOLDER as RUNS
 from fields.template import NAMES
 from models import MODEL_PATH
 from worker.calibration.gate.confidence import confidence_of, logit
-from worker.calibration.gate.quality import GATE, CameraResult
-from worker.calibration.geometry.camera import Camera, Frame, inside
+from worker.calibration.gate.quality import GATE, CameraResult, Moved
+from worker.calibration.geometry.camera import Camera, Frame, Pose, inside
 from worker.calibration.geometry.field import Field
+from worker.calibration.geometry.rotation import rotation_vectors
 from worker.calibration.geometry.visibility import VisibleLines
 from worker.calibration.refinement.least_squares import CLUSTER_POINTS
 
@@ -66,7 +67,8 @@ def main() -> None:
     engine = Engine(MODEL_PATH, Rows(options.rows))
     answers = {name: sections[name](options, engine) for name in options.only}
     everything = [row for rows in answers.values() for row in rows if "agreement" in row]
-    print(f"\nWeights that the choosing half speaks for: {np.round(_weights(everything), 2).tolist()}")
+    weights, without_motion = (np.round(_weights(everything, count), 2).tolist() for count in (4, 3))
+    print(f"\nWeights that the choosing half speaks for: {weights}, without the motion: {without_motion}")
     for name, rows in answers.items():
         print(f"\n## {name}\n")
         for line in _reliability(rows):
@@ -107,23 +109,29 @@ def _chooses(row: dict) -> bool:
     return (key["view"] if "view" in key else zlib.crc32(key["real"].encode())) % 2 == 0
 
 
-def _log_odds(row: dict) -> tuple[float, float]:
-    return logit(row["agreement"]), logit(row["agreement"] / (1 + row["unexplained"]))
+def _witnesses(row: dict) -> tuple[float, ...]:
+    agreement, motion = row["agreement"], Moved(row["moved_deg"], row["moved_m"], 0.0).scale
+    return 1.0, logit(agreement), logit(agreement / (1 + row["unexplained"])), float(np.log(motion))
 
 
-def _weights(rows: Sequence[dict]) -> np.ndarray:
-    """Return bias and weights (3,) of both log odds by logistic regression on the half that chooses.
+def _confidence(row: dict) -> float:
+    return confidence_of(
+        row["agreement"], row["unexplained"], Moved(row["moved_deg"], row["moved_m"], row["moved_px"]).scale
+    )
 
-    Newton's method; a prior of a standard deviation of 10 on the weights keeps them finite where both halves of the
-    answers are apart.
+
+def _weights(rows: Sequence[dict], count: int) -> np.ndarray:
+    """Return the weights of the first `count` witnesses by logistic regression on the half that chooses.
+
+    Newton's method; a prior of a standard deviation of 1 on the weights, since both shares of lines say much the same.
     """
     chosen = [row for row in rows if _chooses(row)]
-    design = np.array([[1.0, *_log_odds(row)] for row in chosen]).reshape(-1, 3)
+    design = np.array([_witnesses(row)[:count] for row in chosen]).reshape(-1, count)
     right = np.array([_is_right(row) for row in chosen])
-    weights, prior = np.zeros(3), np.diag([0.0, 0.01, 0.01])
+    weights, prior = np.zeros(count), np.diag([0.0, *[1.0] * (count - 1)])
     for _ in range(50):
         sure = 1 / (1 + np.exp(-design @ weights))
-        information = (design * (sure * (1 - sure))[:, None]).T @ design + prior + 1e-9 * np.eye(3)
+        information = (design * (sure * (1 - sure))[:, None]).T @ design + prior + 1e-9 * np.eye(count)
         weights = weights + np.linalg.solve(information, design.T @ (right - sure) - prior @ weights)
     return weights
 
@@ -138,10 +146,10 @@ def _reliability(rows: Sequence[dict]) -> Iterator[str]:
     )
     for least, most in pairwise(BINS):
         cells = []
-        inside_bin = [row for row in judged if least <= confidence_of(row["agreement"], row["unexplained"]) < most]
+        inside_bin = [row for row in judged if least <= _confidence(row) < most]
         for half in (True, False):
             part = [row for row in inside_bin if _chooses(row) == half]
-            mean = np.mean([confidence_of(row["agreement"], row["unexplained"]) for row in part]) if part else None
+            mean = np.mean([_confidence(row) for row in part]) if part else None
             share = np.mean([_is_right(row) for row in part]) if part else None
             cells += [str(len(part)), *("" if value is None else f"{value:.3f}" for value in (mean, share))]
         accepted = [row for row in inside_bin if row["accepted"]]
@@ -180,12 +188,23 @@ def _spoil(
             matrix = stored.intrinsics.matrix * np.array([[longer, 1, 1], [1, longer, 1], [1, 1, 1]])
             return taken.frame, stored.with_lens(replace(stored.intrinsics, matrix=matrix)), taken.camera
         case "mirror":
-            return np.ascontiguousarray(taken.frame[:, ::-1]), stored, None
+            # Fields look alike in a mirror: it is what a camera sees from across the field.
+            return np.ascontiguousarray(taken.frame[:, ::-1]), stored, _mirrored(taken.camera)
         case "sport":
             others = [other for other in NAMES if other != name]
             return shot(str(rng.choice(others)), int(rng.integers(3000, 3100))).frame, stored, None
         case _:
             return taken.frame, stored, taken.camera
+
+
+def _mirrored(camera: Camera) -> Camera:
+    """Return the camera that sees the mirror image of what a camera sees of a field."""
+    lens, pose = camera.intrinsics, camera.pose
+    in_picture, on_field = np.diag([-1.0, 1.0, 1.0]), np.diag([1.0, -1.0, 1.0])
+    matrix = lens.matrix.copy()
+    matrix[0, 2] = lens.size[0] - 1 - matrix[0, 2]
+    turned = Pose(rotation_vectors(in_picture @ pose.matrix @ on_field), on_field @ pose.position)
+    return replace(camera, intrinsics=replace(lens, matrix=matrix), pose=turned)
 
 
 def _answer(pitch: Field, stored: Camera, frame: Frame, seed: int, true: Camera | None, engine: Engine) -> dict:

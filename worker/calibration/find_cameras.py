@@ -138,7 +138,7 @@ def find_cameras(
     # the lens that the lines have takes its place, and tells more of the crown.
     remembered = _Remembered(segment, {id(frames[one][n]): r for one in placed for n, r in enumerate(responses[one])})
     beside = [camera for camera in known if camera.id in frames]
-    options = Options(seed=seed, recover="never")
+    options = Options(seed=seed, recover="never", found=frozenset(by_id))
     given, as_given, unfit = pitch, placed, dict[str, str]()
     with progress.timed("calibration"):
         while True:

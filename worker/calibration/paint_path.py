@@ -26,7 +26,6 @@ from worker.calibration.observe import FrameObserver
 from worker.calibration.problem import Problem
 from worker.calibration.records import ProgressReporter
 from worker.calibration.refinement.least_squares import CLUSTER_POINTS
-from worker.calibration.refinement.priors import MOVED_M, MOVED_RAD
 from worker.calibration.steps import network_responses, search_poses
 
 SURE_NATS = float(np.log(1000))
@@ -63,8 +62,7 @@ def log_odds(problem: Problem, found: Sequence[Camera], shares: Sequence[float])
     for stored, camera, share in zip(problem.cameras, found, shares, strict=True):
         pieces = len(VisibleLines.from_camera(lines, camera)) / CLUSTER_POINTS
         moved = Moved.between(problem.pitch, stored, camera)
-        scale = max(np.radians(moved.rotation_deg) / MOVED_RAD, moved.position_m / MOVED_M, 1.0)
-        total += pieces * logit(share) - POSE_NUMBERS * np.log(scale)
+        total += pieces * logit(share) - POSE_NUMBERS * np.log(moved.scale)
     return total
 
 

@@ -48,6 +48,7 @@ class Options:
     `recover`: whether a camera that was knocked and found is proposed to a person or accepted; `never`: it is not
     searched for. `fit_focal_length`: solve for the focal length of each camera, which heat changes; `fit_ridge`: for
     the ridge's height; `lens_may_drift`: whether a pose may be accepted with another focal length than the stored one.
+    `found`: the cameras whose stored poses were found in these frames, and say nothing of how far they have moved.
     """
 
     search: Search = "auto"
@@ -61,6 +62,7 @@ class Options:
     fit_ridge: bool = False
     lens_may_drift: bool = False
     recover: Recover = "propose"
+    found: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True)

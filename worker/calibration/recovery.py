@@ -242,7 +242,7 @@ def _restart_from(problem: Problem, found: Mapping[int, FoundAgain]) -> Problem:
     in_full = frozenset([*problem.observed.in_full, *found])
     observed = replace(problem.observed, views=views, observations=observations, in_full=in_full)
     # Whatever was asked for, from there they are near.
-    options = replace(problem.options, search="auto")
+    options = replace(problem.options, search="auto", found=frozenset(cameras[n].id for n in found))
     return replace(problem, cameras=cameras, memories=memories, observed=observed, options=options)
 
 

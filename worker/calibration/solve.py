@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from worker.calibration.diagnostics.overlap import Overlap
-from worker.calibration.gate.quality import GATE, MUCH_UNEXPECTED, Moved, Refusal
+from worker.calibration.gate.quality import GATE, MUCH_UNEXPECTED, Moved
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.joint_verdict import judge_together
 from worker.calibration.near_path import NearAttempt, NearSolution, refine_by_lines
@@ -54,12 +54,11 @@ def solve(problem: Problem, observer: FrameObserver, progress: ProgressReporter)
     if not _are_mostly_others([judged.cameras[n].overlap for n in problem.usable]):
         return solution, observer
     painted = show_paint_of_field(problem, observer, around_stored_poses, progress.muted())
-    if painted is not None:
-        seen = painted.with_overviews(painted.seen_in(problem), progress)
-        again = _solve_around(seen, painted, range(len(problem.cameras)), NO_CAMERAS, progress)
-        if _is_likelier(again, solution):
-            return _refused_if_chance(problem, again), painted
-    return _refused_if_chance(problem, solution), observer
+    if painted is None:
+        return solution, observer
+    seen = painted.with_overviews(painted.seen_in(problem), progress)
+    again = _solve_around(seen, painted, range(len(problem.cameras)), NO_CAMERAS, progress)
+    return (again, painted) if _is_likelier(again, solution) else (solution, observer)
 
 
 def solve_in_all_colours(problem: Problem, observer: FrameObserver, progress: ProgressReporter) -> Solution:
@@ -134,23 +133,6 @@ def _is_likelier(in_paint: Solution, in_all: Solution) -> bool:
     # What passes neither way is looked for elsewhere, by all that is seen.
     passes = any(one.accepted for one in [*in_all.judged.cameras, *in_paint.judged.cameras])
     return passes and _log_odds(in_all.problem, in_paint.judged) > _log_odds(in_all.problem, in_all.judged)
-
-
-def _refused_if_chance(problem: Problem, solution: Solution) -> Solution:
-    """Return the solution among other lines, its cameras refused if chance finds such poses as likely.
-
-    Lines of another sport may lie as the field's would from farther off.
-    """
-    if _log_odds(problem, solution.judged) > 0:
-        return solution
-    refusal = Refusal(
-        "lines",
-        "most lines in the frame are of other fields, and as far from the stored pose as this some of them fit by "
-        "chance: list the other sports in the field's other_markings, give the colour of its own lines, or store a "
-        "pose that is nearer",
-    )
-    results = [replace(result, refusal=refusal) if result.accepted else result for result in solution.judged.cameras]
-    return replace(solution, judged=solution.judged.with_results(results))
 
 
 def _are_one_explanation(one: Solution, other: Solution) -> bool:

@@ -274,6 +274,7 @@ def _judge(problem: Problem, number: int, pitch: Field, after: RefinedPose) -> C
         moved=Moved.between(problem.pitch, stored, after.camera),
         markings=report_markings(pitch, after, channels, response),
         moved_in_all=None if memory is None else Moved.between(problem.pitch, memory.origin, after.camera),
+        was_found=stored.id in problem.options.found,
     )
     return replace(result, refusal=alone_rejection(result))
 

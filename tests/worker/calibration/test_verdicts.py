@@ -81,7 +81,7 @@ def test_two_good_cameras_of_four_are_accepted_and_the_others_that_see_something
     other = {one.id: paint_frame(field("volleyball"), one) for one in court() if one.id in ("nw", "se")}
     found = run(court, by=0.5, recover="propose", **other)
     assert verdicts(found) == {"sw": True, "se": False, "nw": False, "ne": True}
-    assert all("do not fit this pitch" in one.rejected_because for one in found.cameras if not one.accepted)
+    assert all("do not make its pose sure" in one.rejected_because for one in found.cameras if not one.accepted)
     assert found.rejected_because.startswith("camera se: ")
     off = off_m(found, court())
     assert max(off["sw"], off["ne"]) < 0.02

@@ -2,21 +2,33 @@
 
 Two questions are asked of the frame. How many of the expected lines are found, beyond those that chance would find
 (the agreement)? And how many, if all paint on the field that no line explains counts as line that was expected and not
-found? The log odds of the pose are a weighted sum of the log odds of both answers. Pieces of line are no further
-witnesses: what misleads one of them (a floor of several sports, a shadow, a fence) misleads its neighbours.
+found? And one of the stored pose: how far would the camera have moved? Farther off there are more poses that some lines
+fit. The log odds of the pose are a weighted sum of the log odds of the first two answers and the logarithm of the
+third. Pieces of line are no further witnesses: what misleads one of them (a floor of several sports, a shadow, a fence)
+misleads its neighbours.
 """
 
 import numpy as np
 
-BIAS, OF_AGREEMENT, OF_EXPLAINED = -0.9, 2.3, 3.3
-"""Logistic regression (Platt, 1999) of right answers on both log odds: `python -m benchmarks.confidence`."""
+WEIGHTS = (4.5, 1.4, 0.6, -2.5)
+"""Weights of a constant, of both log odds and of the logarithm of the motion by logistic regression (Platt, 1999) of
+right answers: `python -m benchmarks.confidence`."""
+WEIGHTS_WITHOUT_MOTION = (-0.9, 2.3, 3.3)
+"""Weights where nothing is known of the motion, as of a pose that was found in the frame itself."""
 LEAST_SHARE = 0.01
 """Share of lines that something else always hides, or fits: no answer is surer than that."""
 
 
-def confidence_of(agreement: float, unexplained: float) -> float:
-    """Return the probability 0..1 that a pose is right, by `Evidence.agreement` and `Overlap.unexplained`."""
-    odds = BIAS + OF_AGREEMENT * logit(agreement) + OF_EXPLAINED * logit(agreement / (1 + unexplained))
+def confidence_of(agreement: float, unexplained: float, motion: float | None) -> float:
+    """Return the probability 0..1 that a pose is right, by `Evidence.agreement` and `Overlap.unexplained`.
+
+    `motion`: `Moved.scale` from the stored pose; None where none is known but from the frame.
+    """
+    witnesses = [1.0, logit(agreement), logit(agreement / (1 + unexplained))]
+    if motion is None:
+        odds = np.dot(WEIGHTS_WITHOUT_MOTION, witnesses)
+    else:
+        odds = np.dot(WEIGHTS, [*witnesses, np.log(motion)])
     return float(1 / (1 + np.exp(-odds)))
 
 

@@ -1,7 +1,7 @@
 """Quality gate: judges a result without ground truth, and refuses bad ones."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -17,6 +17,7 @@ from worker.calibration.geometry.plausible_pose import films_a_field
 from worker.calibration.geometry.rotation import rotation_angles_deg
 from worker.calibration.refinement.diagnosis import is_sure
 from worker.calibration.refinement.least_squares import FEWEST_MEASUREMENTS
+from worker.calibration.refinement.priors import MOVED_M, MOVED_RAD
 from worker.calibration.refinement.uncertainty import Deviation, GroundSigma, RefinedPose
 
 MUCH_UNEXPECTED = 0.4
@@ -104,6 +105,11 @@ class Moved:
         )
 
     @property
+    def scale(self) -> float:
+        """How far it is in units of a usual touch, `priors.MOVED_RAD` or `MOVED_M`, whichever is more; 1 at least."""
+        return max(np.radians(self.rotation_deg) / MOVED_RAD, self.position_m / MOVED_M, 1.0)
+
+    @property
     def exceeds_limits(self) -> bool:
         """True if the change is larger than is allowed without somebody storing a new pose."""
         return self.rotation_deg > GATE.largest_rotation_deg or self.position_m > GATE.largest_shift_m
@@ -125,7 +131,8 @@ class CameraResult(RefinedPose):
     `refusal`: why its pose must not replace the stored one, None when it may; `lens_found`: whether the camera's lens
     is not the stored one but what the lines say; `markings`: what is seen of each; `moved_in_all`: since its memory
     began, None without one; `knocked`: whether it was lost, searched for and found again farther from its stored pose
-    than the gate allows.
+    than the gate allows; `was_found`: whether the frame itself has led to where the refinement began, see
+    `Options.found`.
     """
 
     view: ViewCondition
@@ -137,6 +144,7 @@ class CameraResult(RefinedPose):
     markings: Sequence[MarkingReport] = field(default=(), kw_only=True)
     moved_in_all: Moved | None = field(default=None, kw_only=True)
     knocked: bool = field(default=False, kw_only=True)
+    was_found: bool = field(default=False, kw_only=True)
 
     @property
     def accepted(self) -> bool:
@@ -146,7 +154,10 @@ class CameraResult(RefinedPose):
     @property
     def confidence(self) -> float | None:
         """Probability 0..1 that the pose explains the frame; None where the frame cannot be used."""
-        return confidence_of(self.evidence.agreement, self.overlap.unexplained) if self.view.usable else None
+        if not self.view.usable:
+            return None
+        motion = None if self.was_found else self.moved.scale
+        return confidence_of(self.evidence.agreement, self.overlap.unexplained, motion)
 
     @property
     def is_explained(self) -> bool:
@@ -193,19 +204,7 @@ def alone_rejection(result: CameraResult) -> Refusal | None:
         return Refusal(_reason_of(result.view), result.view.words)
     moved, seen = result.moved, result.evidence
     if not result.is_explained:
-        return Refusal(
-            "lines",
-            in_one_sentence(
-                [
-                    f"the markings in the frame do not fit this pitch: {seen.share:.0%} of their length is where it "
-                    f"ought to be ({seen.by_chance:.0%} is seen anywhere), and beside them is paint for "
-                    f"{min(result.overlap.unexplained, 9.99):.0%} of it; the pose is right with a probability of "
-                    f"{result.confidence:.0%}, at least {GATE.least_confidence:.0%} is needed; is it the right camera "
-                    "and the right sport, is the view free and lit, is the stored pose within a few degrees?",
-                    *_other_lines(result),
-                ]
-            ),
-        )
+        return _why_not_explained(result)
     if result.residual_px is None or result.sigma is None:
         return Refusal(
             "few-lines",
@@ -239,10 +238,7 @@ def alone_rejection(result: CameraResult) -> Refusal | None:
             f"seen where it puts them, with the new pose {seen.share:.0%}",
         )
     if moved.exceeds_limits:
-        return Refusal(
-            "moved",
-            f"{moved.words()}; if somebody moved the camera, accept the job by hand once its picture is right",
-        )
+        return _too_far(moved)
     if result.moved_in_all is not None and result.moved_in_all.exceeds_limits:
         return Refusal(
             "moved",
@@ -250,6 +246,31 @@ def alone_rejection(result: CameraResult) -> Refusal | None:
             "be giving way; look at it, then store this pose, or accept the job by hand",
         )
     return None
+
+
+def _too_far(moved: Moved) -> Refusal:
+    advice = "if somebody moved the camera, accept the job by hand once its picture is right"
+    return Refusal("moved", f"{moved.words()}; {advice}")
+
+
+def _why_not_explained(result: CameraResult) -> Refusal:
+    moved, seen = result.moved, result.evidence
+    if moved.exceeds_limits and replace(result, was_found=True).is_explained:
+        return _too_far(moved)
+    return Refusal(
+        "lines",
+        in_one_sentence(
+            [
+                f"the markings in the frame do not make its pose sure: {seen.share:.0%} of their length is where it "
+                f"ought to be ({seen.by_chance:.0%} is seen anywhere), beside them is paint for "
+                f"{min(result.overlap.unexplained, 9.99):.0%} of it, and the camera would have turned by "
+                f"{moved.rotation_deg:.1f} degrees and moved by {moved.position_m:.2f} m; the pose is right with a "
+                f"probability of {result.confidence:.0%}, at least {GATE.least_confidence:.0%} is needed; is it the "
+                "right camera and the right sport, is the view free and lit, is the stored pose within a few degrees?",
+                *_other_lines(result),
+            ]
+        ),
+    )
 
 
 def _why_undetermined(ground: GroundSigma | None) -> str | None:

@@ -25,9 +25,10 @@ def test_a_good_result_passes_the_gate():
     ("change", "cause"),
     [
         (
-            {"evidence": seen(0.4), "overlap": Overlap(0.3, 0.4, 0.4)},
-            "40% of their length is where it ought to be (20% is seen anywhere), and beside them is paint for 33% of "
-            "it; the pose is right with a probability of 0%, at least 91% is needed",
+            {"evidence": seen(0.3), "overlap": Overlap(0.3, 0.4, 0.4), "moved": Moved(1.0, 0.2, 20.0)},
+            "30% of their length is where it ought to be (20% is seen anywhere), beside them is paint for 33% of it, "
+            "and the camera would have turned by 1.0 degrees and moved by 0.20 m; the pose is right with a probability "
+            "of 21%, at least 91% is needed",
         ),
         ({"view": FOGGED, "evidence": seen(0.1)}, "Fogged (far half)"),
         ({"residual_px": None}, "fewer than 30 points"),
@@ -38,6 +39,7 @@ def test_a_good_result_passes_the_gate():
             {"zoom": ZOOMED, "with_fitted_zoom": moved(LEFT, by=(0.5, 0.0, 0.0))},
             "a focal length 2.00% ± 0.20% longer than the venue says",
         ),
+        ({"moved": Moved(9.0, 0.1, 90.0)}, "turned by 9.0 degrees (at most 8.0 allowed)"),
         ({"moved": Moved(20.0, 0.1, 300.0)}, "turned by 20.0 degrees (at most 8.0 allowed)"),
         ({"moved": Moved(1.0, 3.0, 300.0)}, "3.00 m"),
         ({"evidence": seen(0.8), "evidence_before": lambda: seen(0.95)}, "stored pose fits the frame better"),
@@ -48,7 +50,7 @@ def test_the_gate_names_the_cause(change, cause):
 
 
 def test_a_rejection_amid_lines_of_something_else_offers_to_list_them():
-    spoiled = replace(good(), evidence=seen(0.4), overlap=Overlap(0.4, 0.9, 0.56))
+    spoiled = replace(good(), evidence=seen(0.3), overlap=Overlap(0.4, 0.9, 0.56))
     assert "56% of what it takes for lines on the pitch lies beside" in alone_rejection(spoiled).words
     assert "other_markings" in alone_rejection(spoiled).words
     assert "other_markings" not in alone_rejection(replace(spoiled, overlap=Overlap(0.4, 0.4, 0.1))).words
