@@ -6,7 +6,6 @@
 Each job begins where the last one ended, with what the venue remembers. `single`: cameras from measured lines without
 pictures, by the hundred; `venues`: several cameras of a venue that does not match its model, over a hundred nights;
 `rendered`: rendered 4K frames through a real service over HTTP, with a lens that is true, stepping or creeping.
-`year`: small painted frames through the service, and what it says on each day on which something happens.
 """
 
 from __future__ import annotations
@@ -14,10 +13,10 @@ from __future__ import annotations
 import argparse
 from concurrent.futures import ProcessPoolExecutor
 
-from benchmarks.nights import rendered, single, venues, year
+from benchmarks.nights import rendered, single, venues
 from benchmarks.printing import print_sections
 
-SECTIONS = {"single": single.table, "venues": venues.table, "rendered": rendered.table, "year": year.table}
+SECTIONS = {"single": single.table, "venues": venues.table, "rendered": rendered.table}
 
 
 def main() -> None:
