@@ -120,9 +120,7 @@ def find_cameras(
             fraction = SEGMENTED + (SEARCHED - SEGMENTED) * number / len(sought)
             progress.at_fraction("evolution", fraction, remaining_s=pace.remaining_s(number, sought[number:]))
             in_one_paint = _InOnePaint(pitch, markings, one, frames[one.id][0], segment, seed)
-            alone[one.id] = relocalise(
-                pitch, markings, one, *seen[one.id], seed, in_another_way=in_one_paint.relocalise
-            )
+            alone[one.id] = _find_alone(in_one_paint, seen[one.id])
             seen[one.id] = in_one_paint.seen or seen[one.id]
         for helped in _with_lenses_of_others(sought, alone):
             progress.at_fraction("evolution", SEARCHED)
@@ -131,7 +129,6 @@ def find_cameras(
         ground = SharedGround.of(pitch, {camera: its[0] for camera, its in frames.items()})
         placed = _on_their_sides(alone, sought, known, ground) if markings.is_symmetric else alone
         by_id = {one.id: one for one in sought}
-        placed = place_by_numbers(pitch, markings, placed, by_id, seen)
         placed = tell_rivals_apart(pitch, markings, placed, by_id, known, ground)
 
     # Calibrate those that were found, as every later job will, until none has a given lens that its lines contradict:
@@ -232,6 +229,20 @@ class _InOnePaint:
         self.seen = seen
         remark = "the lines of one colour alone were taken for the field's, others for those of other sports"
         return replace(found, remarks=[*found.remarks, remark])
+
+
+def _find_alone(in_one_paint: _InOnePaint, seen: Seen) -> Relocalisation:
+    """Find a camera by what is `seen` in its frame alone: by all of it, by the numbers on the field, in one paint."""
+    pitch, markings, sought = in_one_paint.pitch, in_one_paint.markings, in_one_paint.sought
+    by_numbers: Relocalisation | None = None
+
+    def in_another_way(in_all: Relocalisation) -> Relocalisation | None:
+        nonlocal by_numbers
+        by_numbers = place_by_numbers(pitch, markings, in_all, sought, *seen)
+        return by_numbers or in_one_paint.relocalise(in_all)
+
+    found = relocalise(pitch, markings, sought, *seen, in_one_paint.seed, in_another_way=in_another_way)
+    return by_numbers or place_by_numbers(pitch, markings, found, sought, *(in_one_paint.seen or seen)) or found
 
 
 def _best_agreement(found: Relocalisation) -> float:

@@ -239,6 +239,11 @@ class Field:
         """Line points by their spacing: a calibration asks for them dozens of times."""
         return {}
 
+    @cached_property
+    def point_shifts(self) -> dict[str, Array]:
+        """Shifts (N, 3) of the measured points by a parameter, metres per metre, by its name, as far as computed."""
+        return {}
+
     def other_points(self, spacing: float = 0.25) -> LinePoints | None:
         """Return the line points of `others`, lines that are painted there and not the field's; None without any."""
         others = [_marking(shape) for shape in self.others]

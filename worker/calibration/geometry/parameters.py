@@ -57,7 +57,12 @@ class FieldParameter:
 
     def around(self, pitch: Field) -> Self:
         """Return this parameter with its `shift` for the lines of a pitch that may have been changed since."""
-        return self if pitch is self.pitch else replace(self, shift=self._shift_of(pitch), pitch=pitch)
+        if pitch is self.pitch:
+            return self
+        # Each refinement on a field asks for them, and to draw its lines again takes long.
+        if self.name not in pitch.point_shifts:
+            pitch.point_shifts[self.name] = self._shift_of(pitch)
+        return replace(self, shift=pitch.point_shifts[self.name], pitch=pitch)
 
     def applied(self, cameras: Sequence[Camera], pitch: Field, by: float) -> tuple[list[Camera], Field]:
         """Return cameras and field with this parameter changed; only measures can be solved for."""

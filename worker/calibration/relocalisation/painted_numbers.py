@@ -1,6 +1,6 @@
 """Painted numbers tell apart the poses that evenly spaced yard lines leave open."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import cv2
@@ -29,31 +29,29 @@ STROKES_OF_DIGIT = 7
 def place_by_numbers(
     field: Field,
     markings: FieldMap,
-    found: Mapping[str, Relocalisation],
-    sought: Mapping[str, SoughtCamera],
-    seen: Mapping[str, tuple[Channels, NDArray[np.float32]]],
-) -> dict[str, Relocalisation]:
-    """Return what was `found`, with each camera whose lines agree where the numbers on the field put it along them."""
-    results = dict(found)
-    if field.template.numbers is None:
-        return results
-    for one, its in found.items():
-        if its.refusal is not None and its.refusal.reason != "not-unique":
-            continue
-        channels, response = seen[one]
-        reader = _NumberReader.of(field, field.template.numbers, channels)
-        first, *others = its.candidates
-        camera = reader.most_likely([_slid(first.camera, by) for by in (0.0, *slides_along(markings, 0))])
-        if camera is None or not sought[one].place.allows(camera.pose.position[None])[0]:
-            continue
-        if camera.pose is not first.camera.pose:
-            first = FrameObservations.of(field, channels, response).settled(camera, sought[one])
-            others = list(its.candidates)
-        as_likely = [other for other in others if reader.most_likely([camera, other.camera]) is not camera]
-        refusal = why_not_taken(field, markings, sought[one], [first, *as_likely])
-        remark = "the numbers on the field tell which of its lines are seen"
-        results[one] = Relocalisation([first, *others], refusal, [*its.remarks, remark])
-    return results
+    found: Relocalisation,
+    sought: SoughtCamera,
+    channels: Channels,
+    response: NDArray[np.float32],
+) -> Relocalisation | None:
+    """Return the result for a camera whose lines agree at the place along the field where its numbers are.
+
+    None if they do not tell: where none are painted or seen, or no pose agrees with the lines.
+    """
+    lines_agree = found.refusal is None or found.refusal.reason == "not-unique"
+    if field.template.numbers is None or not lines_agree:
+        return None
+    reader = _NumberReader.of(field, field.template.numbers, channels)
+    best = found.candidates[0]
+    camera = reader.most_likely([_slid(best.camera, by) for by in (0.0, *slides_along(markings, 0))])
+    if camera is None or not sought.place.allows(camera.pose.position[None])[0]:
+        return None
+    settled = FrameObservations.of(field, channels, response).settled(camera, sought)
+    as_likely = [one for one in found.candidates if reader.most_likely([camera, one.camera]) is not camera]
+    refusal = why_not_taken(field, markings, sought, [settled, *as_likely])
+    others = found.candidates[1:] if camera is best.camera else found.candidates
+    remark = "the numbers on the field tell which of its lines are seen"
+    return Relocalisation([settled, *others], refusal, [*found.remarks, remark])
 
 
 @dataclass(frozen=True)
