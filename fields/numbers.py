@@ -34,12 +34,12 @@ class PaintedNumbers:
 
     def strokes(self, text: str) -> list[list[Point]]:
         """Return a polyline for each digit of a number: from its middle to the right, and from its feet up."""
-        pitch, inset = self.width + self.apart, self.stroke / 2
-        left = -(len(text) * pitch - self.apart) / 2
+        step, inset = self.width + self.apart, self.stroke / 2
+        left = -self.half_width(text)
         return [
             [
                 (
-                    left + number * pitch + inset + x * (self.width - self.stroke),
+                    left + number * step + inset + x * (self.width - self.stroke),
                     inset + y * (self.height - self.stroke),
                 )
                 for x, y in STROKES[digit]
