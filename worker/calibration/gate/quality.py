@@ -106,7 +106,7 @@ class Moved:
 
     @property
     def scale(self) -> float:
-        """How far it is in units of a usual touch, `priors.MOVED_RAD` or `MOVED_M`, whichever is more; 1 at least."""
+        """Size of the change in units of a usual touch, `MOVED_RAD` or `MOVED_M`, the larger of both; 1 at least."""
         return max(np.radians(self.rotation_deg) / MOVED_RAD, self.position_m / MOVED_M, 1.0)
 
     @property
