@@ -262,8 +262,8 @@ def _why_not_explained(result: CameraResult) -> Refusal:
         in_one_sentence(
             [
                 f"the markings in the frame do not make its pose sure: {seen.share:.0%} of their length is where it "
-                f"ought to be ({seen.by_chance:.0%} is seen anywhere), beside them is paint for "
-                f"{min(result.overlap.unexplained, 9.99):.0%} of it, and the camera would have turned by "
+                f"ought to be ({seen.by_chance:.0%} is seen anywhere); beside them is paint for "
+                f"{min(result.overlap.unexplained, 9.99):.0%} of it; the camera would have turned by "
                 f"{moved.rotation_deg:.1f} degrees and moved by {moved.position_m:.2f} m; the pose is right with a "
                 f"probability of {result.confidence:.0%}, at least {GATE.least_confidence:.0%} is needed; is it the "
                 "right camera and the right sport, is the view free and lit, is the stored pose within a few degrees?",

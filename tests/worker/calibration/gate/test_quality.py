@@ -26,9 +26,9 @@ def test_a_good_result_passes_the_gate():
     [
         (
             {"evidence": seen(0.3), "overlap": Overlap(0.3, 0.4, 0.4), "moved": Moved(1.0, 0.2, 20.0)},
-            "30% of their length is where it ought to be (20% is seen anywhere), beside them is paint for 33% of it, "
-            "and the camera would have turned by 1.0 degrees and moved by 0.20 m; the pose is right with a probability "
-            "of 21%, at least 91% is needed",
+            "30% of their length is where it ought to be (20% is seen anywhere); beside them is paint for 33% of it; "
+            "the camera would have turned by 1.0 degrees and moved by 0.20 m; the pose is right with a probability of "
+            "21%, at least 91% is needed",
         ),
         ({"view": FOGGED, "evidence": seen(0.1)}, "Fogged (far half)"),
         ({"residual_px": None}, "fewer than 30 points"),
