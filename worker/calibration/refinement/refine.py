@@ -24,8 +24,8 @@ from worker.calibration.memory.repainted_markings import find_repainted_markings
 from worker.calibration.refinement.anderson_mixing import MixedSteps
 from worker.calibration.refinement.diagnosis import is_sure
 from worker.calibration.refinement.estimate import Estimate, GaussNewtonStep, gauss_newton_step
-from worker.calibration.refinement.least_squares import misfit_px
-from worker.calibration.refinement.uncertainty import Deviation, RefinedPoses, estimate_uncertainty
+from worker.calibration.refinement.least_squares import misfit_px, rms_px
+from worker.calibration.refinement.uncertainty import Deviation, RefinedPoses, estimate_uncertainty, rms_of_all
 from worker.calibration.refinement.unknowns import Unknowns
 from worker.calibration.robust import huber_weights, tukey_weights
 
@@ -151,13 +151,41 @@ def refine_coarsely(
 
     Good to compare hypotheses. Where they end depends a little on where they begin, by less than their sigma.
     """
-    unknowns = Unknowns(len(cameras), free, Ground.under(pitch.measured_points))
-    begun = Estimate.initial(pitch, cameras, unknowns)
-    refiner = _Refiner(observations.reader(), unknowns, np.empty(0, np.intp), cameras)
-    caught = refiner.catch(begun, searches_px)
+    refiner, caught = _caught(pitch, cameras, observations, free, searches_px)
     last = replace(refiner.around(caught), found=caught.cameras).follow(caught)
-    uneven = last.unevenness(unknowns, unknowns.ground.ordinary)
+    uneven = last.unevenness(refiner.unknowns, refiner.unknowns.ground.ordinary)
     return _assessed(replace(last.to, uneven_m=uneven), cameras, [None] * len(cameras), refiner)
+
+
+def catch_lines(
+    pitch: Field,
+    cameras: Sequence[Camera],
+    observations: Observations,
+    free: Sequence[Parameter],
+    searches_px: Sequence[float],
+) -> tuple[list[Camera], float]:
+    """Return the cameras, moved to where they catch the lines, and the rms distance (px) of what they have caught.
+
+    Good to begin a refinement; arguments as for `refine`.
+    """
+    refiner, caught = _caught(pitch, cameras, observations, free, searches_px)
+    measured = refiner.measure(caught, SEARCH_PX[-1])
+    residuals = [
+        rms_px(caught.lines.position, camera, found) for camera, found in zip(caught.cameras, measured, strict=True)
+    ]
+    return caught.cameras, rms_of_all(residuals)
+
+
+def _caught(
+    pitch: Field,
+    cameras: Sequence[Camera],
+    observations: Observations,
+    free: Sequence[Parameter],
+    searches_px: Sequence[float],
+) -> "tuple[_Refiner, Estimate]":
+    unknowns = Unknowns(len(cameras), free, Ground.under(pitch.measured_points))
+    refiner = _Refiner(observations.reader(), unknowns, np.empty(0, np.intp), cameras)
+    return refiner, refiner.catch(Estimate.initial(pitch, cameras, unknowns), searches_px)
 
 
 @dataclass(frozen=True)

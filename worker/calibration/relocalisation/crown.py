@@ -15,7 +15,14 @@ from worker.calibration.gate.quality import GATE
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.parameters import FREE_RIDGE_M, LensParameter, free_ridge
-from worker.calibration.refinement.refine import CLEARLY_MORE, SEARCH_PX, Observations, refine, refine_coarsely
+from worker.calibration.refinement.refine import (
+    CLEARLY_MORE,
+    SEARCH_PX,
+    Observations,
+    catch_lines,
+    refine,
+    refine_coarsely,
+)
 from worker.calibration.refinement.uncertainty import RefinedPoses, rms_of_all
 from worker.calibration.relocalisation.candidate import Candidate, FrameObservations, free_lens_if_sought
 from worker.calibration.relocalisation.sought import SoughtCamera
@@ -59,9 +66,9 @@ def _catch_lines(
     # A lens that has bent to the flat holds a free ridge down. So it bends to a high crown first, whose lines lie
     # farther from where the flat has them than an ordinary refinement looks.
     roofs = [roof.raised(FREE_RIDGE_M) for roof in flat.roofs()]
-    bent = [refine_coarsely(roof, cameras, observations, lenses, (28.0, *SEARCH_PX)) for roof in roofs]
-    begun = min(bent, key=lambda one: one.residual_px)
-    return refine_coarsely(begun.pitch, begun.cameras, observations, [*lenses, *free_ridge(begun.pitch)])
+    bent = [catch_lines(roof, cameras, observations, lenses, (28.0, *SEARCH_PX)) for roof in roofs]
+    roof, (begun, _) = min(zip(roofs, bent, strict=True), key=lambda one: one[1][1])
+    return refine_coarsely(roof, begun, observations, [*lenses, *free_ridge(roof)])
 
 
 def _is_high_enough(found: RefinedPoses) -> bool:
