@@ -34,7 +34,7 @@ from benchmarks.rows import Rows
 from benchmarks.scenes import FOLDER as RUNS
 from fields.template import NAMES
 from models import MODEL_PATH
-from worker.calibration.gate.confidence import confidence_of, logit
+from worker.calibration.gate.confidence import confidence_of, witnesses
 from worker.calibration.gate.quality import GATE, CameraResult, Moved
 from worker.calibration.geometry.camera import Camera, Frame, Pose, inside
 from worker.calibration.geometry.field import Field
@@ -109,15 +109,10 @@ def _chooses(row: dict) -> bool:
     return (key["view"] if "view" in key else zlib.crc32(key["real"].encode())) % 2 == 0
 
 
-def _witnesses(row: dict) -> tuple[float, ...]:
-    agreement, motion = row["agreement"], Moved(row["moved_deg"], row["moved_m"], 0.0).scale
-    return 1.0, logit(agreement), logit(agreement / (1 + row["unexplained"])), float(np.log(motion))
-
-
-def _confidence(row: dict) -> float:
-    return confidence_of(
-        row["agreement"], row["unexplained"], Moved(row["moved_deg"], row["moved_m"], row["moved_px"]).scale
-    )
+def _asked(row: dict) -> tuple[float, float, float]:
+    """Return what `confidence_of` asks of a row."""
+    moved = Moved(row["moved_deg"], row["moved_m"], row["moved_px"])
+    return row["agreement"], row["unexplained"], moved.scale
 
 
 def _weights(rows: Sequence[dict], count: int) -> np.ndarray:
@@ -126,7 +121,7 @@ def _weights(rows: Sequence[dict], count: int) -> np.ndarray:
     Newton's method; a prior of a standard deviation of 1 on the weights, since both shares of lines say much the same.
     """
     chosen = [row for row in rows if _chooses(row)]
-    design = np.array([_witnesses(row)[:count] for row in chosen]).reshape(-1, count)
+    design = np.array([witnesses(*_asked(row))[:count] for row in chosen]).reshape(-1, count)
     right = np.array([_is_right(row) for row in chosen])
     weights, prior = np.zeros(count), np.diag([0.0, *[1.0] * (count - 1)])
     for _ in range(50):
@@ -146,10 +141,10 @@ def _reliability(rows: Sequence[dict]) -> Iterator[str]:
     )
     for least, most in pairwise(BINS):
         cells = []
-        inside_bin = [row for row in judged if least <= _confidence(row) < most]
+        inside_bin = [row for row in judged if least <= confidence_of(*_asked(row)) < most]
         for half in (True, False):
             part = [row for row in inside_bin if _chooses(row) == half]
-            mean = np.mean([_confidence(row) for row in part]) if part else None
+            mean = np.mean([confidence_of(*_asked(row)) for row in part]) if part else None
             share = np.mean([_is_right(row) for row in part]) if part else None
             cells += [str(len(part)), *("" if value is None else f"{value:.3f}" for value in (mean, share))]
         accepted = [row for row in inside_bin if row["accepted"]]
@@ -204,7 +199,7 @@ def _mirrored(camera: Camera) -> Camera:
     matrix = lens.matrix.copy()
     matrix[0, 2] = lens.size[0] - 1 - matrix[0, 2]
     turned = Pose(rotation_vectors(in_picture @ pose.matrix @ on_field), on_field @ pose.position)
-    return replace(camera, intrinsics=replace(lens, matrix=matrix), pose=turned)
+    return camera.with_lens(replace(lens, matrix=matrix)).with_pose(turned)
 
 
 def _answer(pitch: Field, stored: Camera, frame: Frame, seed: int, true: Camera | None, engine: Engine) -> dict:

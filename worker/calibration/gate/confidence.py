@@ -25,12 +25,14 @@ def confidence_of(agreement: float, unexplained: float, motion: float | None) ->
 
     `motion`: `Moved.scale` from the stored pose; None where none is known but from the frame.
     """
-    witnesses = [1.0, logit(agreement), logit(agreement / (1 + unexplained))]
-    if motion is None:
-        odds = np.dot(WEIGHTS_WITHOUT_MOTION, witnesses)
-    else:
-        odds = np.dot(WEIGHTS, [*witnesses, np.log(motion)])
-    return float(1 / (1 + np.exp(-odds)))
+    weights = WEIGHTS_WITHOUT_MOTION if motion is None else WEIGHTS
+    return float(1 / (1 + np.exp(-np.dot(weights, witnesses(agreement, unexplained, motion)))))
+
+
+def witnesses(agreement: float, unexplained: float, motion: float | None) -> list[float]:
+    """Return what the weights are of, the motion last where one is known; arguments as of `confidence_of`."""
+    by_frame = [1.0, logit(agreement), logit(agreement / (1 + unexplained))]
+    return by_frame if motion is None else [*by_frame, float(np.log(motion))]
 
 
 def logit(share: float) -> float:

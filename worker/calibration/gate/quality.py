@@ -1,7 +1,7 @@
 """Quality gate: judges a result without ground truth, and refuses bad ones."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -255,7 +255,8 @@ def _too_far(moved: Moved) -> Refusal:
 
 def _why_not_explained(result: CameraResult) -> Refusal:
     moved, seen = result.moved, result.evidence
-    if moved.exceeds_limits and replace(result, was_found=True).is_explained:
+    wherever_it_stood = confidence_of(seen.agreement, result.overlap.unexplained, None)
+    if moved.exceeds_limits and wherever_it_stood >= GATE.least_confidence:
         return _too_far(moved)
     return Refusal(
         "lines",

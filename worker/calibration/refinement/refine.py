@@ -151,7 +151,7 @@ def refine_coarsely(
 
     Good to compare hypotheses. Where they end depends a little on where they begin, by less than their sigma.
     """
-    refiner, caught = _caught(pitch, cameras, observations, free, searches_px)
+    refiner, caught = _catch(pitch, cameras, observations, free, searches_px)
     last = replace(refiner.around(caught), found=caught.cameras).follow(caught)
     uneven = last.unevenness(refiner.unknowns, refiner.unknowns.ground.ordinary)
     return _assessed(replace(last.to, uneven_m=uneven), cameras, [None] * len(cameras), refiner)
@@ -168,7 +168,7 @@ def catch_lines(
 
     Good to begin a refinement; arguments as for `refine`.
     """
-    refiner, caught = _caught(pitch, cameras, observations, free, searches_px)
+    refiner, caught = _catch(pitch, cameras, observations, free, searches_px)
     measured = refiner.measure(caught, SEARCH_PX[-1])
     residuals = [
         rms_px(caught.lines.position, camera, found) for camera, found in zip(caught.cameras, measured, strict=True)
@@ -176,13 +176,14 @@ def catch_lines(
     return caught.cameras, rms_of_all(residuals)
 
 
-def _caught(
+def _catch(
     pitch: Field,
     cameras: Sequence[Camera],
     observations: Observations,
     free: Sequence[Parameter],
     searches_px: Sequence[float],
 ) -> "tuple[_Refiner, Estimate]":
+    """Return a refiner, and the estimate after its rounds that catch the lines."""
     unknowns = Unknowns(len(cameras), free, Ground.under(pitch.measured_points))
     refiner = _Refiner(observations.reader(), unknowns, np.empty(0, np.intp), cameras)
     return refiner, refiner.catch(Estimate.initial(pitch, cameras, unknowns), searches_px)

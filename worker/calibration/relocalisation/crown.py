@@ -45,7 +45,7 @@ def find_crown(
     A lens that was given stays.
     """
     lenses = _free_lenses(sought, candidates)
-    caught = _catch_lines(flat, [one.camera for one in candidates], lenses, observations)
+    caught = _refine_on_closer_roof(flat, [one.camera for one in candidates], lenses, observations)
     if not _is_high_enough(caught):
         return None
     found = refine(caught.pitch, caught.cameras, observations, 0.0, [*lenses, *free_ridge(caught.pitch)])
@@ -59,7 +59,7 @@ def find_crown(
     return CrownedField(found.pitch, refined)
 
 
-def _catch_lines(
+def _refine_on_closer_roof(
     flat: Field, cameras: Sequence[Camera], lenses: Sequence[LensParameter], observations: Observations
 ) -> RefinedPoses:
     """Refine cameras, lenses and a ridge coarsely, on the roof that the lines lie closer to."""

@@ -1,7 +1,7 @@
 """Painted numbers tell apart the poses that evenly spaced yard lines leave open."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from fields.numbers import PaintedNumbers
 from worker.calibration.detection.contrast import Channel, Channels
+from worker.calibration.gate.confidence import logit
 from worker.calibration.gate.quality import GATE
 from worker.calibration.geometry.camera import Array, Camera, Pose, inside
 from worker.calibration.geometry.field import Field
@@ -43,11 +44,12 @@ def place_by_numbers(
         return None
     reader = _NumberReader.of(field, field.template.numbers, channels)
     best = found.candidates[0]
-    camera = reader.most_likely([_slid(best.camera, by) for by in (0.0, *slides_along(markings, 0))])
+    camera = reader.most_likely([best.camera, *(_slid(best.camera, by) for by in slides_along(markings, 0))])
     if camera is None or not sought.place.allows(camera.pose.position[None])[0]:
         return None
     settled = FrameObservations.of(field, channels, response).settled(camera, sought)
-    as_likely = [one for one in found.candidates if reader.most_likely([camera, one.camera]) is not camera]
+    least = reader.log_likelihood(camera) - logit(GATE.least_confidence)
+    as_likely = [one for one in found.candidates if reader.log_likelihood(one.camera) > least]
     refusal = why_not_taken(field, markings, sought, [settled, *as_likely])
     others = found.candidates[1:] if camera is best.camera else found.candidates
     remark = "the numbers on the field tell which of its lines are seen"
@@ -100,12 +102,12 @@ class _NumberReader:
 
     def most_likely(self, cameras: Sequence[Camera]) -> Camera | None:
         """Return the camera that puts the numbers where the picture has them; None if none is probable enough."""
-        likelihood = np.array([self._log_likelihood(camera) for camera in cameras])
+        likelihood = np.array([self.log_likelihood(camera) for camera in cameras])
         odds = np.exp(likelihood - likelihood.max())
         best = int(odds.argmax())
         return cameras[best] if odds[best] / odds.sum() >= GATE.least_confidence else None
 
-    def _log_likelihood(self, camera: Camera) -> float:
+    def log_likelihood(self, camera: Camera) -> float:
         """Return how much likelier the picture is with numbers where a camera puts them than with none, in nats.
 
         Unknown, and the same for all, are how far their feet are from the touchline, and whether they are brighter or
@@ -113,7 +115,7 @@ class _NumberReader:
         """
         correlations = np.array([self._correlation(camera, n, side) for n in self.numbers for side in (1, -1)])
         either = np.concatenate([np.maximum(sign * correlations, 0.0) for sign in (1, -1)], axis=1)
-        # Linear regression on the paint of two digits: half of its independent pieces times what it leaves unexplained.
+        # Linear regression on the paint of two digits: half its independent pieces times the log of what it leaves open.
         each = (-STROKES_OF_DIGIT * np.log1p(-(either**2))).sum(axis=0)
         return float(np.logaddexp.reduce(each) - np.log(len(each)))
 
@@ -140,7 +142,5 @@ class _NumberReader:
 
 
 def _slid(camera: Camera, along: float) -> Camera:
-    """Return the camera moved along the field, the same one if it does not move."""
-    if along == 0.0:
-        return camera
-    return replace(camera, pose=Pose(camera.pose.rotation, camera.pose.position + [along, 0.0, 0.0]))
+    """Return the camera moved along the field."""
+    return camera.with_pose(Pose(camera.pose.rotation, camera.pose.position + [along, 0.0, 0.0]))
