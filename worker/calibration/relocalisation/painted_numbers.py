@@ -115,7 +115,7 @@ class _NumberReader:
         """
         correlations = np.array([self._correlation(camera, n, side) for n in self.numbers for side in (1, -1)])
         either = np.concatenate([np.maximum(sign * correlations, 0.0) for sign in (1, -1)], axis=1)
-        # Linear regression on the paint of two digits: half its independent pieces times the log of what it leaves open.
+        # Regression on the paint of two digits: half their pieces times the log of what it leaves unexplained.
         each = (-STROKES_OF_DIGIT * np.log1p(-(either**2))).sum(axis=0)
         return float(np.logaddexp.reduce(each) - np.log(len(each)))
 
